@@ -10,7 +10,6 @@ initially at rest. A sweep updates one set of forces, or eight in parallel.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from granforce.motion.box_motion import (
     carried,
@@ -75,29 +74,22 @@ def set_stiffness(problem):
 def add_forces(problem, force, velocity, dilation):
     """Velocities (N, 3) after the contact forces act for one step; returns the new λ."""
     for c in range(problem.i.shape[0]):
-        if force[c, 0] != 0.0 or force[c, 1] != 0.0:
-            dilation = _push(problem, c, force[c, 0], force[c, 1], velocity, dilation, ONE)
+        f_n, f_t = force[c, 0], force[c, 1]
+        if f_n == 0.0 and f_t == 0.0:
+            continue
+        i, j = problem.i[c], problem.j[c]
+        w_i, w_j = problem.inverse_mass[i], problem.inverse_mass[j]
+        n_x, n_y = problem.n_x[c], problem.n_y[c]
+        f_x, f_y = f_n * n_x - f_t * n_y, f_n * n_y + f_t * n_x
+        velocity[i, 0] -= w_i * f_x
+        velocity[i, 1] -= w_i * f_y
+        velocity[j, 0] += w_j * f_x
+        velocity[j, 1] += w_j * f_y
+        velocity[i, 2] -= problem.inverse_inertia[i] * problem.arm_i[c] * f_t
+        velocity[j, 2] -= problem.inverse_inertia[j] * problem.arm_j[c] * f_t
+        compliance = problem.box_compliance * problem.length[c]
+        dilation = pushed(dilation, compliance, f_n, f_t, n_x, n_y)
     return dilation
-
-
-@njit(inline="always")
-def _push(problem, c, f_n, f_t, velocity, dilation, lanes):
-    i, j = 3 * problem.i[c], 3 * problem.j[c]
-    w_i = same(lanes, problem.inverse_mass[problem.i[c]])
-    w_j = same(lanes, problem.inverse_mass[problem.j[c]])
-    u_i = same(lanes, problem.inverse_inertia[problem.i[c]] * problem.arm_i[c])
-    u_j = same(lanes, problem.inverse_inertia[problem.j[c]] * problem.arm_j[c])
-    n_x, n_y = same(lanes, problem.n_x[c]), same(lanes, problem.n_y[c])
-    f_x = f_n * n_x - f_t * n_y
-    f_y = f_n * n_y + f_t * n_x
-    store(velocity, i, lanes, load(velocity, i, lanes) - w_i * f_x)
-    store(velocity, i + 1, lanes, load(velocity, i + 1, lanes) - w_i * f_y)
-    store(velocity, j, lanes, load(velocity, j, lanes) + w_j * f_x)
-    store(velocity, j + 1, lanes, load(velocity, j + 1, lanes) + w_j * f_y)
-    store(velocity, i + 2, lanes, load(velocity, i + 2, lanes) - u_i * f_t)
-    store(velocity, j + 2, lanes, load(velocity, j + 2, lanes) - u_j * f_t)
-    compliance = same(lanes, problem.box_compliance * problem.length[c])
-    return pushed(dilation, compliance, f_n, f_t, n_x, n_y)
 
 
 @compiled
@@ -109,33 +101,52 @@ def sweep(problem, order, mu, force, velocity, dilation, lanes):
     change in place. Returns the new λ, Σ (|Δf_n| + |Δf_t|) and Σ f_n over contacts.
     """
     zero = same(lanes, 0.0)
-    change = total = zero
+    change = total = x = y = turn = zero
+    held = -1
     for k in range(order.shape[0]):
         c = order[k]
-        i, j = 3 * problem.i[c], 3 * problem.j[c]
-        n_x, n_y = same(lanes, problem.n_x[c]), same(lanes, problem.n_y[c])
-        v_x = load(velocity, j, lanes) - load(velocity, i, lanes)
-        v_y = load(velocity, j + 1, lanes) - load(velocity, i + 1, lanes)
-        length, closing = same(lanes, problem.length[c]), same(lanes, problem.closing[c])
+        a, b = problem.i[c], problem.j[c]
+        i, j = 3 * a, 3 * b
+        # Most contacts follow another one of the same grain, whose velocity need not be stored and
+        # loaded in between: each update waits for the last.
+        if i != held:
+            held = i
+            x, y = load(velocity, i, lanes), load(velocity, i + 1, lanes)
+            turn = load(velocity, i + 2, lanes)
+        x_j, y_j = load(velocity, j, lanes), load(velocity, j + 1, lanes)
+        n_x, n_y = same(lanes, load(problem.n_x, c, ONE)), same(lanes, load(problem.n_y, c, ONE))
+        v_x, v_y = x_j - x, y_j - y
+        reach = load(problem.length, c, ONE)
+        length, closing = same(lanes, reach), same(lanes, load(problem.closing, c, ONE))
         v_n = v_x * n_x + v_y * n_y + stretched(dilation, n_x, n_y) * length + closing
         old_n, old_t = load(force, 2 * c, lanes), load(force, 2 * c + 1, lanes)
-        f_n = larger(old_n - v_n * same(lanes, problem.stiff_n[c]), zero)
+        f_n = larger(old_n - v_n * same(lanes, load(problem.stiff_n, c, ONE)), zero)
         if vanishes(f_n) and vanishes(old_n) and vanishes(old_t):
             continue
-        v_t = (
-            v_y * n_x
-            - v_x * n_y
-            - same(lanes, problem.arm_i[c]) * load(velocity, i + 2, lanes)
-            - same(lanes, problem.arm_j[c]) * load(velocity, j + 2, lanes)
-        )
+        arm_i, arm_j = load(problem.arm_i, c, ONE), load(problem.arm_j, c, ONE)
+        turn_j = load(velocity, j + 2, lanes)
+        v_t = v_y * n_x - v_x * n_y - same(lanes, arm_i) * turn - same(lanes, arm_j) * turn_j
         v_t = sheared(dilation, v_t, length, n_x, n_y)
         most = same(lanes, mu) * f_n
-        f_t = larger(old_t - v_t * same(lanes, problem.stiff_t[c]), -most)
+        f_t = larger(old_t - v_t * same(lanes, load(problem.stiff_t, c, ONE)), -most)
         f_t = pick(f_t, most, most, f_t)
         d_n, d_t = f_n - old_n, f_t - old_t
         store(force, 2 * c, lanes, f_n)
         store(force, 2 * c + 1, lanes, f_t)
-        dilation = _push(problem, c, d_n, d_t, velocity, dilation, lanes)
+        f_x, f_y = d_n * n_x - d_t * n_y, d_n * n_y + d_t * n_x
+        w_i = same(lanes, load(problem.inverse_mass, a, ONE))
+        w_j = same(lanes, load(problem.inverse_mass, b, ONE))
+        x, y = x - w_i * f_x, y - w_i * f_y
+        turn = turn - same(lanes, load(problem.inverse_inertia, a, ONE) * arm_i) * d_t
+        store(velocity, i, lanes, x)
+        store(velocity, i + 1, lanes, y)
+        store(velocity, i + 2, lanes, turn)
+        store(velocity, j, lanes, x_j + w_j * f_x)
+        store(velocity, j + 1, lanes, y_j + w_j * f_y)
+        u_j = same(lanes, load(problem.inverse_inertia, b, ONE) * arm_j)
+        store(velocity, j + 2, lanes, turn_j - u_j * d_t)
+        compliance = same(lanes, problem.box_compliance * reach)
+        dilation = pushed(dilation, compliance, d_n, d_t, n_x, n_y)
         change = change + (size(d_n) + size(d_t))
         total = total + f_n
     return dilation, change, total
