@@ -77,7 +77,7 @@ def make_replay(
     frames: Any = np.concatenate([dataset["original"].values[None], dataset["states"].values[pick]])
     frames = (frames / scale).astype(np.float32)
     number = np.linspace(0, walked - 1, stored).astype(int)[pick] + 1
-    summary |= {"mu": mu, "n": _count(packing), "contacts": len(backbone)}
+    summary |= {"mu": mu, "n": geometry.bodies(packing), "contacts": len(backbone)}
     summary |= {"kept": len(pick), "states": walked}
 
     growing = measures.growing(frames[1:]).items()
@@ -116,7 +116,7 @@ def first_replay(S: Any, states: int) -> Replay:
         sampling=measures.sampling(original[None]),
         summary={
             "mu": S.mu,
-            "n": _count(S.packing),
+            "n": geometry.bodies(S.packing),
             "contacts": len(S.index),
             "states": states,
             "packing_fraction": S.packing.packing_fraction,
@@ -124,11 +124,6 @@ def first_replay(S: Any, states: int) -> Replay:
             "dimension": S.dimension,
         },
     )
-
-
-def _count(packing: Packing) -> int:
-    """The number of disks or bodies, without walls."""
-    return int((~packing.are_walls).sum())
 
 
 def _replay(

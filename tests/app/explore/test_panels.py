@@ -39,9 +39,10 @@ from app.explore.tabs.intervals import intervals as intervals_view
 from app.explore.tabs.intervals.growth_figure import GrowthFigure
 from app.explore.tabs.push import push as perturb_view
 from app.explore.tabs.push.over_packings import responses
+from app.explore.tabs.your_packing import samples
 from app.explore.tabs.your_packing import upload as upload_view
 from app.packing.player import Player, frames
-from app.results import distributions, planes, study_data, uploads
+from app.results import distributions, photoelastic_frames, planes, study_data, uploads
 from app.results.library import Library
 from app.results.replays import first_replay
 from app.results.saved_file import csv
@@ -411,7 +412,7 @@ def test_walls_of_disks_are_lines_and_chains_end_at_them():
 @pytest.mark.parametrize(
     "name, content",
     [
-        ("a.csv", upload_view.SAMPLES["bodies.csv"].encode()),
+        ("a.csv", samples.sample("bodies")[0].content),
         (
             "a.json",
             b'{"bodies": [{"disk": [0, 1, 1]}, {"corners": [[-1, -1], [2, 0], [-1, 0]], '
@@ -425,10 +426,21 @@ def test_a_file_of_bodies_is_read(name, content):
     assert len(uploads.read(files, mu=0.5).shapes.sides) == 2
 
 
-def test_the_sample_of_disks_is_held_by_walls():
-    files = uploads.added({}, [("disks.csv", upload_view.SAMPLES["disks.csv"].encode())])
-    packing = uploads.read(files, mu=0.3, box=None, tilt=0.0, walls="box", gravity=1.0)
-    assert gf.ensemble(packing).dimension == 10
+@pytest.mark.parametrize("name", upload_view.SAMPLES)
+def test_a_sample_is_handed_over_and_read(state, name):
+    """That of disks needs what its button says."""
+    view, handed = upload_view.View(state), []
+    view.samples.tell = handed.append
+    view.samples.hear({"key": name})
+    wait_for(state)
+    files = uploads.added({}, [(file["name"], file["content"]) for file in handed])
+    assert not uploads.missing(files) and uploads.loose(files) == (name == "disks")
+    if name == "photoelastic":
+        found = photoelastic_frames.infer(files, mu=0.3, walls=None, reverse=False)
+        assert len(found(Job(lambda job: None)).packing.r) == 12
+    else:
+        held = {"walls": "box", "gravity": 1.0} if name == "disks" else {}
+        assert gf.ensemble(uploads.read(files, mu=0.3, **held)).dimension > 0
 
 
 def test_a_scene_of_bodies_has_a_link_and_is_made_where_it_is_opened(tmp_path):
@@ -576,7 +588,7 @@ def test_what_is_said_of_friction_is_made_from_the_study(state):
     assert sorted(shown) == sorted(claim["id"] for claim in every)  # each once
     ((most, _),) = Counter(claim["sampler"] for claim in every).most_common(1)
     judged = f"judged by what is named below each, mostly {SAMPLERS[most]}."
-    assert judged in view.first.object and judged in told
+    assert judged in told and "drawn from nearest-network walks" in told
     pushed = len(study_data.claims(2))
     assert told.count("<tr><td>") == len(every) - pushed > 20
 

@@ -17,10 +17,6 @@ SAMPLERS = {
     "exact": "exact",
     "": "packings",
 }
-JUDGED_BY = (
-    "The figures are drawn from nearest-network walks; claims are judged by what is named below "
-    f"each, mostly {SAMPLERS['gauss_seidel']}."
-)
 PAPER = "Shaebani, Unger, Kertész, PRE 79, 052302 (2009)"
 HEAD = "<tr><th>claim</th><th>verdict</th><th>cases</th><th>others</th></tr>"
 TABLE = "<div class='judged'><table class='claims'>{}</table></div>"
@@ -46,8 +42,9 @@ def summary() -> str:
     return (
         f"<b>What became of the claims of {PAPER}, and of the letter before it?</b> Below each "
         f"claim: the number that is judged, and its range for {marks}. A claim is reproduced if "
-        "the 95 % interval of each case is in the range, and contradicted if one is outside. "
-        f"{JUDGED_BY}"
+        "the 95 % interval of each case is in the range, and contradicted if one is outside. The "
+        "figures above are drawn from nearest-network walks; claims are judged by what is named "
+        f"below each, mostly {SAMPLERS['gauss_seidel']}."
     )
 
 

@@ -17,7 +17,6 @@ from ....widgets.hints import term
 from ....widgets.parts import figure
 from ....widgets.plot_style import DOT, legend_above
 from ...result_values import with_error
-from . import claims
 from .against_friction import COLOURS, MARKERS, AgainstFriction, Line
 
 MEASURES = (("eta1", "η₁", 1.0), ("eta2", "η₂", 1.0), ("eta3", "0.15 η₃ seen", 0.15))
@@ -71,7 +70,7 @@ class Indeterminacy:
             f"friction have fewer contacts: z falls from {z[0][1]:.2f} to {z[-1][1]:.2f} (inset). "
             f"{_in_the_paper()}Points: means over {packings_at_each(walks)} packings of 400 "
             "disks, with standard errors; open symbols: the packing on screen. Click a point to "
-            f"open or compute such a packing. {claims.JUDGED_BY}"
+            "open or compute such a packing."
         )
 
 

@@ -2,7 +2,6 @@
 
 import html
 from typing import Any
-from urllib.parse import quote
 
 import panel as pn
 import panel_material_ui as pmui
@@ -12,45 +11,39 @@ from granforce.packing.importers.text import number_or_nan
 from granforce.records import InputError, brief, friction, make_cell, positive
 from granforce.system.wording import number
 
-from ....background.jobs import error_line
+from ....background.jobs import error_line, reading
 from ....background.limits import LIMITS
 from ....results import photoelastic_frames, uploads
+from ....results.saved_file import File
 from ....results.selection import Selection, typed
 from ....state.app_state import AppState
+from ....widgets.file_buttons import Handover
 from ....widgets.file_drop import Dropper
 from ....widgets.parts import PRIMARY, by_words, note
 from ....widgets.select import Select
 from . import photoelastic as measured
+from . import samples
 from .my_computations import Mine
 
-# Examples to look at, and to try: a heap between walls under gravity, and a block on another.
-SAMPLES = {
-    "disks.csv": "x,y,r\n1,1,1\n3,1,1\n5,1,1\n2,2.7320508,1\n4,2.7320508,1\n3,4.4641016,1\n",
-    "bodies.csv": "body,x,y,fixed\n1,0,0,0\n1,1,0,0\n1,0,1,0\n2,-1,-1,1\n2,2,-1,1\n2,2,0,1\n"
-    "2,-1,0,1\n",
-}
 STATES = 200  # of the first walk
-
-
-def _sample(name: str) -> str:
-    """A link that saves an example, as HTML."""
-    return f'<a download="{name}" href="data:text/csv,{quote(SAMPLES[name])}">sample</a>'
-
-
-HELP = f"""
+SAMPLES = {
+    "disks": "Table of disks (walls: a floor and two sides, gravity: 1)",
+    "bodies": "Table of bodies",
+    "lammps": "LAMMPS: two dumps",
+    "photoelastic": "Photoelastic frame: two lists",
+}
+HELP = """
 <b>NPZ</b> as written by <code>granforce pack --out</code> or <code>granforce import --out</code>;
 <b>LAMMPS</b>: a <code>dump custom</code> of the particles and a <code>dump local</code> of the
 contacts; <b>tables</b> (CSV): disks with columns x, y, r and, optionally, contacts with columns i,
-j and f_n, f_t ({_sample("disks.csv")}; walls: a floor and two sides, gravity: 1); <b>bodies</b>
-(CSV or JSON): convex polygons and disks, with columns body, x, y, as for
-<code>granforce import blocks</code> ({_sample("bodies.csv")});
-<b>photoelastic frames</b>, as PeGS writes them: positions (frame, id, x, y, r, flag at a wall) and
-an adjacency list (frame, id, id, fₜ, fₙ), or a <code>_solved.mat</code> of PeGS 2, for which the
-nearest balanced forces are computed. Positions with a line of headers may have a column G2 or
-pressure: with its calibration a, b, σ, each disk has a measured pressure a G² + b ± σ, too.
-Something must hold the disks of a table: enter a periodic box, or walls and gravity, or give
-columns fx, fy, torque with the load on each disk. Files are read into memory. A packing is saved in
-the cache; a frame is saved only if you open it as a packing.
+j and f_n, f_t; <b>bodies</b> (CSV or JSON): convex polygons and disks, with columns body, x, y, as
+for <code>granforce import blocks</code>; <b>photoelastic frames</b>, as PeGS writes them: positions
+(frame, id, x, y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a
+<code>_solved.mat</code> of PeGS 2, for which the nearest balanced forces are computed. Positions
+with a line of headers may have a column G2 or pressure: with its calibration a, b, σ, each disk has
+a measured pressure a G² + b ± σ, too. Something must hold the disks of a table: enter a periodic
+box, or walls and gravity, or give columns fx, fy, torque with the load on each disk. Files are read
+into memory. A packing is saved in the cache; a frame is saved only if you open it as a packing.
 """
 HOLD_WANTED = (
     "What holds the disks? Enter the sides of a periodic box in Box, such as 30, 30, and its tilt, "
@@ -102,6 +95,8 @@ class View:
         self.brought: uploads.Brought | None = None
         self.report = note()
         self.frame = pn.Column(sizing_mode="stretch_width")
+        self.samples = Handover(self._asked, files={"Samples to try": SAMPLES}, margin=(2, 10))
+        self.making = state.work.task(reading)
         self.read.on_click(lambda event: self._read())
         self.task.param.watch(lambda event: self._refuse(event.new), "message")
         state.param.watch(self._report, "replay")
@@ -121,10 +116,20 @@ class View:
             self.report,
             self.frame,
             note(HELP),
+            self.samples,
             # On a shared server it would show the computations of all visitors.
             *([] if LIMITS.shared else [Mine(self.state)]),
             sizing_mode="stretch_width",
         )
+
+    def _asked(self, name: str) -> None:
+        """Hand over the files of a sample."""
+
+        def done(files: list[File]) -> None:
+            for file in files:
+                self.samples.hand_over(file)
+
+        self.making.start(lambda job: samples.sample(name), done)
 
     def _ask(self) -> None:
         """Show the fields that these files need."""
