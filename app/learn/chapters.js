@@ -9,7 +9,7 @@ import { SceneExperiment } from "./experiments/scene_experiment.js"
 
 const two = (v) => v.toFixed(2)
 const listed = (words) => new Intl.ListFormat("en-GB").format(words)
-const whole = (v) => v.toFixed(0)
+const touching = ({ contacts, disks }) => 2 * contacts / disks
 const percent = (v) => `${Math.round(100 * v)}\u00a0%`
 const raised = (v) => [...String(v)].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("")
 // Without walls: further rows of the count.
@@ -19,10 +19,25 @@ const PRESSED = [
 ]
 
 /** Contacts at their limits against free numbers, in words; nothing if fewer forces are fixed than numbers were free. */
-function fixed(opened, sliding, free) {
-  const forces = 2 * opened + sliding
-  return forces < free ? "" : ` That fixes 2 × ${opened} + ${sliding} = ${forces} forces, enough for all ${free} free numbers: nothing is left to change.`
+function fixed(opened, sliding, bare, free) {
+  const forces = 2 * opened + sliding, known = 3 * bare
+  const twice = known ? ` ${known} of them follow from the others, as a disk with no contact left is in balance anyway: ${forces} − ${known} = ${forces - known}.` : ""
+  return forces - known < free ? "" : ` That fixes 2 × ${opened} + ${sliding} = ${forces} forces.${twice} So none of the ${free} free numbers is left to change.`
 }
+
+/** The largest force in a groove of two walls at 45° as a linear program, folded. */
+const PROGRAM = `<details><summary>A linear program, written out: the groove of chapter 2</summary><table>${[
+  ["largest", "N₁"], ["no net force sideways", "N₁ − T₁ = N₂ − T₂"], ["none up or down", "N₁ + T₁ + N₂ + T₂ = √2 × weight"], ["no turning", "T₁ = T₂"],
+  ["friction is limited (T: up along the wall)", "−μN₁ ≤ T₁ ≤ μN₁, −μN₂ ≤ T₂ ≤ μN₂"], ["walls only press", "N₁ ≥ 0, N₂ ≥ 0"], ["the corner found, for μ = 0.5", "N₁ = N₂ = 1.41, T₁ = T₂ = −0.71"],
+].map((row) => `<tr>${row.map((cell) => `<td>${cell}</td>`).join("")}</tr>`).join("")}</table></details>`
+
+const SUMMARY = `<ul>
+  <li><b>S</b>: all sets of forces that hold the same disks.</li>
+  <li><b>Its dimension</b>: unknown forces minus equations.</li>
+  <li><b>Walk and bounds</b>: a random walk shows what is typical, a linear program what is possible.</li>
+  <li><b>Friction</b>: it widens S, but packings made with more of it have fewer contacts, so S has fewer dimensions.</li>
+  <li><b>Limit load and motion</b>: beyond the limit load S is empty; disks move before, where their own forces meet its edge.</li>
+</ul>`
 
 /** The count of free numbers, line by line, with the sum in the last row. */
 function counted({ contacts, disks, equations, free }, pressed) {
@@ -34,26 +49,24 @@ function counted({ contacts, disks, equations, free }, pressed) {
   ]
 }
 
-const BOX = { x: { low: 1, high: 4, label: "normal force at the floor (green)" }, y: { low: 0, high: 5, label: "between the disks (violet)" } }
-
 /**
- * Each chapter: name in links; title in the list; heading; text and ask, shown first; doing, the instruction
- * for dragging; see(facts): reason and surprise; verdict(facts, prediction): in place of "It is …"; count(facts): the
- * rows of a sum; x, y, second: axes; experiment with options.
+ * Each chapter: name in links; title in the list; heading; text and ask, shown first; doing(facts), the instruction
+ * for dragging; see(facts): reason, surprise and more, as HTML; verdict(facts, prediction): in place of "It is …"; count(facts):
+ * the rows of a sum, live during dragging if `live`; x, y, second: axes; experiment with options.
  */
 export const CHAPTERS = [
   {
     name: "ladder", title: "A ladder", heading: "Which will it be?",
     text: ({ mu }) => `A ladder of weight 1 leans against a rough wall on a rough floor: friction is at most μ = ${mu} times the normal force (pale wedges). A mechanics course solves it without friction at the wall. With it, four forces are unknown, two at each end, and there are three equations of balance.`,
-    ask: "The drawing shows one solution. How large is the wall’s normal force?",
-    doing: "Drag the dot as far as it goes, to both sides, or drag an arrow. Wherever you stop, the ladder is in balance.",
+    ask: "The arrows show one solution. How large is the wall’s normal force?",
+    doing: () => "Drag the dot as far as it goes, to both sides, or drag an arrow. Wherever you stop, the ladder is in balance.",
     verdict: ({ low, high }, prediction) => ({
       answer: `Anything from ${two(low)} to ${two(high)}.`,
       so: prediction < low || prediction > high ? ", which is not among them" : ": possible, like all the others",
     }),
     see: ({ low, high, smooth }) => [
-      `At ${two(low)} the wall’s friction holds the ladder up as hard as it can; at ${two(high)} it pulls it down. Textbooks make the wall smooth: without its friction only one value is left, ${two(smooth)}.`,
-      "A real ladder does take one of these values. Which one depends on how it bends and on how it was set up, and a rigid body knows neither. So we ask another question: what is possible?",
+      `At ${two(low)} the wall’s friction holds the ladder up as hard as it can; at ${two(high)} it pulls it down. Textbooks make the wall smooth and keep the floor rough: only ${two(smooth)} is left. (The slider changes both.)`,
+      "A real ladder does take one of these values. Which one depends on how it bends and was set up, and a rigid body knows neither. So we ask: what is possible? <b>All sets of forces that hold it are called S</b>, here the pale bar.",
     ],
     x: { low: 0, high: 0.6, label: "normal force at the wall (weight of the ladder = 1)" }, y: null,
     experiment: SceneExperiment, options: { scene: "ladder", x: 2, y: null, goal: "both" },
@@ -62,10 +75,10 @@ export const CHAPTERS = [
     name: "groove", title: "One disk in a groove", heading: "How hard does the wall press?",
     text: ({ mu }) => `A disk of weight 1 lies between two walls. Each wall exerts a normal force on it and a friction force along the wall, at most ${mu} times the normal force. Four unknown forces, three equations of balance: one number stays free.`,
     ask: "How large can the left wall’s normal force become?",
-    doing: "Drag the dot to the right as far as it goes, or drag an arrow. All forces stay in balance; a wedge turns dark where its contact is about to slip.",
+    doing: () => "Drag the dot to the right as far as it goes, or drag an arrow. All forces stay in balance; a wedge turns dark where its contact is about to slip.",
     see: ({ low, high, mu }) => [
-      `At ${two(high)} the disk would slip upwards if friction did not pull it down along both walls, and friction gives ${two(mu * high)} at most: ${mu} × ${two(high)}. At ${two(low)} friction holds the disk up, as hard as it can. So each wall can press harder than the disk weighs.`,
-      "The bar is called S: each of its points is one set of forces that holds the disk. Which one is real? That depends on how the disk was pressed in and how it deforms, if only by a hair. We call disks rigid to leave both open. Now change the friction: S grows, shrinks to a point, locks.",
+      `At ${two(high)} the disk would slip upwards if friction did not pull it down along both walls, and friction gives ${two(mu * high)} at most: ${mu} × ${two(high)}. At ${two(low)} friction holds the disk up. So each wall can press harder than the disk weighs.`,
+      "Each point of the bar, S, is one set of forces that holds the disk. Which one is real depends on how the disk was pressed in and how it deforms, if only by a hair; we call disks rigid to leave both open. Now change the friction: at which μ is S one point, and from which μ on has it no end?",
     ],
     count: (facts) => counted(facts, false),
     x: { low: 0, high: 3, label: "normal force at the left wall (weight of the disk = 1)" }, y: null,
@@ -75,25 +88,25 @@ export const CHAPTERS = [
     name: "box", title: "Two disks in a box", heading: "How much can the floor carry?",
     text: ({ mu }) => `Two disks of weight 1 lie in a box, with friction of at most ${mu} times each normal force. Eight unknown forces, six equations: two numbers stay free, and S is an area. The axes of the plot are two of the forces, green and violet.`,
     ask: "How large can the floor’s normal force become?",
-    doing: "Drag the dot along the edge of S, all the way round. What its path encloses turns blue: between two possible sets of forces, every mixture is possible too.",
+    doing: () => "Drag the dot as far as it goes: right, up, left and down. What its path encloses turns blue: between two possible sets of forces, every mixture is possible too.",
     see: ({ high, weight, mu }) => [
-      `Both disks together weigh ${weight}. The other ${two(high - weight)} comes from the walls: the disks are wedged between them, and friction there pulls them down. With more, the lower disk would slip on the floor, where friction is at its limit, ${mu} × ${two(high)}.`,
-      "Every point of the polygon is one set of forces that holds the same two disks; at its edges a disk is about to slip. Now raise the friction: from which μ on do the disks lock in the box, with forces as large as you like?",
+      `Both disks weigh ${weight}. The other ${two(high - weight)} comes from the walls, where friction pulls the wedged disks down. With more, the lower disk would slip on the floor: friction is at its limit there, ${mu} × ${two(high)}.`,
+      "Every point of the polygon is one set of forces that holds the same two disks. Drag the dot along its edges: above the drawing you read what is about to slip. Then raise the friction: from which μ on can forces be as large as you like?",
     ],
     count: (facts) => counted(facts, false),
-    ...BOX,
+    x: { low: 1, high: 4, label: "normal force at the floor (green)" }, y: { low: 0, high: 5, label: "between the disks (violet)" },
     experiment: SceneExperiment, options: { scene: "box", x: 4, y: 0, goal: "round" },
   },
   {
     name: "thirteen", title: "Thirteen disks", heading: "How strong can one contact get?",
-    text: ({ contacts, equations, free, disks, start, mu, mean }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations: S has ${free} dimensions. No screen can show them, so the plot has two of the forces as axes. The green one starts at ${two(start)}; the mean is ${two(mean)}.`,
+    text: ({ contacts, equations, free, disks, start, mu, mean }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations (counted later): S has ${free} dimensions. No screen can show them, so the plot has two of the forces as axes. The green one starts at ${two(start)}; the mean of all is ${two(mean)}.`,
     ask: "How large can the green force become?",
-    doing: "Drag the dot to the right as far as it goes, or drag an arrow. All disks stay in balance. Dark: a contact is about to slip (wedge) or to open (ring).",
+    doing: () => "Drag the dot to the right as far as it goes, or drag an arrow. All disks stay in balance. Dark: a contact is about to slip (wedge) or to open (ring).",
     see: ({ low, high, free, others }) => [
-      `Every contact must press, and friction is limited at each. At ${two(high)} so many contacts are about to open or to slip that none of the ${free} numbers is free any more. From ${two(low)} to ${two(high)} every value is possible, although no disk moves.`,
-      others ? "The dot stayed, but the other forces changed. So the plot is a shadow of S: as in the shadow of a body, many points lie behind each of its points."
+      `At ${two(high)} so many contacts are about to open or to slip that none of the ${free} numbers is free any more. From ${two(low)} to ${two(high)} every value is possible, although no disk moves.`,
+      `${others ? "The dot stayed, but the other forces changed. So the plot is a shadow of S: as in the shadow of a body, many points lie behind each of its points."
         : others === false ? "Here, at the very edge, there is only one set of forces. Move the dot inside, then change the others."
-          : "The dot fixes two forces. And the others? Move it away from the edge, and press “Change the other forces”. Then change the friction: how little is too little?",
+          : "The dot fixes two forces. And the others? Move it away from the edge, and press “Change the other forces”."} Then change the friction: how little is too little?`,
     ],
     count: (facts) => counted(facts, true),
     x: { low: 0, high: 7, label: "normal force between disks 1 and 12 (green)" }, y: { low: 0, high: 5, label: "between disks 8 and 13 (violet)" },
@@ -101,23 +114,24 @@ export const CHAPTERS = [
   },
   {
     name: "four-hundred", title: "Four hundred disks", heading: "Grab one force",
-    text: ({ all, mu, start, contacts, equations, free }) => `${all} disks at μ = ${mu}. A line joins two disks that press on each other, thicker for a larger force. By the same count, ${2 * contacts} forces − ${equations} equations = ${free} free numbers: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean force.`,
+    text: ({ all, disks, mu, start, contacts, free }) => `${all} disks at μ = ${mu}; ${all - disks} pale ones carry nothing. Lines join disks in contact, thicker for larger forces. As before, 2 × ${contacts} forces − (3 × ${disks} − 1) equations = ${free} free numbers: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean.`,
     ask: "How large can you make this force while no disk moves?",
-    doing: "Drag the dot to the right, or the marked line upwards. Other lines follow: orange ones grow, blue ones shrink. Dots: about to slip; rings: about to open.",
-    see: ({ high, opened, sliding, changed, contacts, free }) => [
-      `At ${two(high)}, ${opened} contacts have lost both their forces, and friction is at its limit at ${sliding}.${fixed(opened, sliding, free)} ${changed} other forces have changed by more than a tenth of the mean force; a photograph would look the same.`,
-      `How is ${two(high)} found? As in the box, drawn again below: balance and limits are linear, so S has flat sides, and the largest value of a force is at a corner. Finding this corner is called a linear program. A computer does it for all ${2 * contacts} forces in well under a second.`,
+    doing: () => "Drag the dot to the right, or the marked line upwards. Other lines follow: orange ones grow, blue ones shrink. Dots: about to slip; rings: about to open.",
+    see: ({ high, opened, sliding, bare, changed, contacts, free }) => [
+      `At ${two(high)}, ${opened} contacts have lost both their forces (rings), and friction is at its limit at ${sliding} (dots).${fixed(opened, sliding, bare, free)} ${changed} other forces have changed by more than a tenth of the mean force; a photograph would look the same.`,
+      `How is ${two(high)} found? Balance and limits are linear, so S has flat sides, and the largest value of a force is at a corner, as in the box of chapter 3 (small plot). Finding this corner is called a linear program. A computer does it for all ${2 * contacts} forces in well under a second.`,
+      PROGRAM,
     ],
     x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: null,
-    experiment: Grab, options: { axes: BOX, across: 4, up: 0 },
+    experiment: Grab, options: { across: 2, up: 3, axes: { x: { low: 0, high: 5, label: "two disks in a box: normal force at the left wall" }, y: { low: -1, high: 1.5, label: "friction" } } },
   },
   {
     name: "chance", title: "A random walk", heading: "How far does chance go?",
     text: ({ low, high, states }) => `By hand, the green force goes from ${two(low)} to ${two(high)}. Pale: all it can be together with a violet force, a shadow of S. Now chance walks through S in ${states} steps. Each changes all forces at random and then corrects them until all disks are in balance: a new network, one point of S.`,
     ask: "What is the largest green force that chance finds?",
-    doing: "Press “Walk”, or drag the slider. Each dot is a network, one after every twentieth step; network 0 is the one in which the packing came to rest.",
-    see: ({ part, share, free }) => [
-      `The walk covers ${percent(part)} of what is possible for the green force. Its dots fill ${percent(share)} of the pale area, far from the edge: to get there, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
+    doing: ({ step }) => `Press “Walk”, or drag the slider. Each dot is a network, one after every ${step} steps; network 0 is the one in which the packing came to rest.`,
+    see: ({ part, share, free, between }) => [
+      `${between ? "The largest value came between two of the dots. " : ""}The walk covers ${percent(part)} of what is possible for the green force. Its dots fill ${percent(share)} of the pale area, far from the edge: to get there, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
       `A walk shows what is typical, not what is possible. And this is only a shadow: a part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S.`,
     ],
     x: { low: 0.5, high: 4, label: "green force (mean force = 1)" }, y: { low: 0, high: 3, label: "violet force" },
@@ -125,33 +139,41 @@ export const CHAPTERS = [
   },
   {
     name: "friction", title: "Friction", heading: "Where are forces least determined?",
-    text: ({ all, mu }) => `The forces of ${all} disks at μ = ${mu} walk at random through S, all sets of forces that hold the disks; watch the marked line. More friction lets each force lean further. But disks packed with more friction also come to rest with fewer contacts.`,
+    text: ({ all }) => `So far μ changed for the same disks. <b>Here each μ is a new packing</b> of ${all} disks. Its forces walk at random through S, all sets of forces that hold the disks. More friction lets each force lean further; but each contact pushes sideways too, so disks rest with three contacts each, where four are needed without friction.`,
     ask: "At which friction μ do the forces vary most?",
-    doing: "Drag the dot along the whole axis, to both ends. Blue: how much the forces vary. Grey: how many numbers are free. Both are means over packings made with that friction.",
+    doing: () => "Drag the dot along the whole axis, to both ends. Blue: how much the forces vary. Grey: how many numbers are free.",
     see: ({ rows }) => {
       const most = rows.reduce((one, other) => (other.spread > one.spread ? other : one)), first = rows[0], last = rows.at(-1)
       return [
-        `At small μ many numbers are free, but friction leaves each little room: at μ = ${first.mu}, ${whole(first.free)} are free and forces vary by ${percent(first.spread)}. With more friction each has more room, and forces vary by ${percent(most.spread)} at μ = ${most.mu}.`,
-        `But disks packed with more friction touch fewer others, ${two(last.touching)} instead of ${two(first.touching)}, so numbers are lost: ${whole(most.free)} are free at μ = ${most.mu}, ${whole(last.free)} at μ = ${last.mu}. S first grows wider and then loses its dimensions.`,
+        `At μ = ${first.mu} many numbers are free, ${first.free}, but friction leaves each little room: forces vary by ${percent(first.spread)}. With more friction each has more room: ${percent(most.spread)} at μ = ${most.mu}.`,
+        `But the packing made at μ = ${last.mu} has ${two(touching(last))} contacts per disk, the one at μ = ${first.mu} ${two(touching(first))}: so numbers are lost, ${most.free} are free at μ = ${most.mu} and ${last.free} at μ = ${last.mu}. S first grows wider and then loses its dimensions. (Line: mean over many packings.)`,
       ]
     },
+    live: true,
+    count: (facts) => [
+      [`μ = ${facts.mu}: contacts per disk, 2 × ${facts.contacts} / ${facts.disks}`, two(touching(facts))],
+      [`free numbers, 2 × ${facts.contacts} − (3 × ${facts.disks} − 1)`, facts.free],
+      ["forces vary by (typical deviation in the walk, mean force = 1)", percent(facts.spread)],
+    ],
     x: { low: 0.001, high: 10, log: true, label: "friction μ" }, y: { low: 0, high: 0.2, label: "forces vary by (mean force = 1)" }, second: { low: 0, high: 400, label: "free numbers" },
     experiment: Friction, options: {},
   },
   {
     name: "push", title: "Why it matters", heading: "When does something move?",
-    text: ({ mu }) => `The same packing at μ = ${mu}. The two disks of the marked line press on each other. Now they are pushed apart. The other forces change as little as they can, as they would if all contacts were very stiff springs, all alike.`,
+    text: ({ mu }) => `The packing of chapter 5 again, μ = ${mu}. The two disks of the marked line press on each other. Now they are pushed apart. The other forces change as little as they can, as they would if all contacts were very stiff springs, all alike.`,
+    verdict: ({ limits: [first, ...others] }) => ({ answer: `It is ${two(first)}${others.length ? ` with the forces as packed, ${listed(others.map(two))} with others` : ""}.`, so: "" }),
     ask: "How hard can you push before a disk moves?",
-    doing: "Drag the dot to the right, or an arrow away from the marked line.",
+    doing: () => "Drag the dot to the right, or an arrow away from the marked line.",
     see: ({ high, limit, limits, number, opened, slid, carried, moving, pushed }) => [
-      moving ? `Now ${opened} contacts open (rings), ${slid} slip (dots), and disks start to move. Arrows and motion are drawn enlarged.`
+      moving ? `Now ${opened} contacts open (rings), ${slid} slip (dots), and disks start to move (black arrows, enlarged). Both disks of the pair move, one of them faster: the gap between them opens.`
         : pushed ? `Without a push, the two disks press on each other with ${two(carried)}. At a push of ${two(high)}, disks start to move.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
-      `Up to ${two(limit)}, the limit load, S is not empty: some set of forces carries the push. The packing gives way earlier, as it starts from the forces it has, and its history chose those. ${limits.length > 1
-        ? `The same disks gave way at ${listed(limits.map(two))}: no picture of them shows which. That is why it matters how undetermined forces are.`
+      `The small plot shows how S shrinks as the push grows, to one point at ${two(limit)}, the limit load. The packing gives way earlier, where its own force (line) meets the edge of S; its history chose that force. ${limits.length > 1
+        ? "No picture of the disks shows which push moves them. That is why it matters how undetermined forces are."
         : "Would the same disks give way at the same push with other forces?"}`,
+      SUMMARY,
     ],
     x: { low: 0, high: 2, label: "push (mean force = 1)" }, y: null,
-    experiment: Push, options: {},
+    experiment: Push, options: { x: { low: 0, high: 1.5, label: "push" }, y: { low: 0, high: 1.4, label: "force of the line" } },
   },
 ]

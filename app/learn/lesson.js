@@ -83,12 +83,13 @@ class Lesson {
     if (turn !== this.openings) return experiment.stop()
     this.main.className = ""
     const { stops } = experiment, x = stops ? { ...chapter.x, stops, ticks: stops.filter(isDecade) } : chapter.x
-    parts.text.textContent = chapter.text(experiment.facts)
+    parts.text.innerHTML = chapter.text(experiment.facts)
     parts.text.append(" ", createElement("strong", { textContent: chapter.ask }))
     const save = (more) => { this.progress.set(chapter.name, more); this.show() }
     const again = () => { save({ prediction: null, done: false }); this.open(number) }
     this.mechanism = new PredictDoSee({ ...chapter, x }, experiment, parts, this.progress.of(chapter.name), { save, again, drawn: () => this.paint() })
     this.sized.observe(parts.picture)
+    if (!this.model.alone && turn === 1) this.root.querySelector("h1").focus({ preventScroll: true }) // the next stop of the Tab key is the marker
     this.ahead ??= this.fetch()
   }
 
@@ -99,7 +100,7 @@ class Lesson {
   /** The parts of a chapter's page. */
   lay(chapter) {
     const { number } = this, last = number === CHAPTERS.length - 1
-    const heading = createElement("h1", { textContent: chapter.heading, tabIndex: -1 }), text = createElement("p", { className: "text" })
+    const [heading, left, extra] = [["h1", { textContent: chapter.heading, tabIndex: -1 }], ["div", { className: "left" }], ["div", { className: "extra" }]].map((one) => createElement(...one)), text = createElement("p", { className: "text" })
     const voice = createElement("div", { className: "voice", ariaLive: "polite" })
     voice.textContent = "Loading … The first time on a server, this can take a minute."
     const [picture, plot] = ["picture", "plot"].map((className) => createElement("figure", { className }))
@@ -113,8 +114,10 @@ class Lesson {
     const foot = createElement("div", { className: "foot" }) // always in view, as it says what to do next
     foot.append(voice, row)
     this.main.className = "waiting"
-    this.main.replaceChildren(heading, text, picture, plot, knob, foot, after)
-    return { text, picture, plot, knob, voice, row, foot, after }
+    left.append(picture, extra)
+    this.main.replaceChildren(heading, text, left, plot, knob, foot, after)
+    if (chapter.live) plot.after(extra) // next to what is dragged
+    return { text, picture, plot, extra, knob, voice, row, foot, after }
   }
 
   /** The list of chapters, with finished ones marked. */

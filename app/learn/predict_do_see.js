@@ -10,12 +10,12 @@ const STAGES = ["Predict", "Do", "See"]
 
 export class PredictDoSee {
   /**
-   * chapter: of chapters.js; experiment: loaded; parts: {plot, knob, voice, row, foot, after}: their elements; progress: {prediction,
+   * chapter: of chapters.js; experiment: loaded; parts: {plot, extra, knob, voice, row, foot, after}: their elements; progress: {prediction,
    * done} of an earlier visit; save({prediction, done}): called to store progress; drawn(): called to repaint;
    * again(): called to start the chapter anew.
    */
-  constructor(chapter, experiment, { plot, knob, voice, row, foot, after }, { prediction, done }, { save, drawn, again }) {
-    Object.assign(this, { chapter, experiment, host: plot, knob, voice, row, foot, after, save, drawn, prediction, predicted: false, ready: true, announced: done })
+  constructor(chapter, experiment, { plot, extra, knob, voice, row, foot, after }, { prediction, done }, { save, drawn, again }) {
+    Object.assign(this, { chapter, experiment, host: plot, extra, knob, voice, row, foot, after, save, drawn, prediction, predicted: false, ready: true, announced: done })
     plot.classList.toggle("plane", Boolean(chapter.y))
     this.plot = new QuantityPlot(plot, chapter, { marker: (value) => this.mark(value), dot: (x, y) => experiment.drag(x, y) })
     this.button = button("That is my prediction", () => this.begin(), { className: "primary" })
@@ -59,8 +59,9 @@ export class PredictDoSee {
     const unlocked = this.unlock()
     ;(this.experiment.steered ? this.plot.dot : this.slider).focus({ preventScroll: true })
     await unlocked
-    this.host.style.scrollMarginBottom = `${this.foot.offsetHeight}px` // which covers what lies below
-    this.host.scrollIntoView({ block: "nearest" })
+    const last = this.knob.hidden ? this.chapter.live ? this.extra : this.host : this.knob
+    last.style.scrollMarginBottom = `${this.foot.offsetHeight}px` // which covers what lies below
+    last.scrollIntoView({ block: "nearest" })
   }
 
   /** Enable dragging, once the data for it are there. */
@@ -118,36 +119,35 @@ export class PredictDoSee {
     }, { signal: once.signal })
   }
 
-  /** The only line of text: the instruction, or the result. */
+  /** The only line of text: the instruction, or the result; and what belongs to it: a count, a picture. */
   speak(stage) {
-    const { chapter, experiment } = this
+    const { chapter, experiment, voice, extra } = this, { facts } = experiment
     if (stage < 2) {
-      const words = stage === 0 ? PREDICT : this.ready ? chapter.doing : WAIT
-      this.say([words], () => [createElement("p", { textContent: words })])
+      const words = stage === 0 ? PREDICT : this.ready ? chapter.doing(facts) : WAIT
+      this.say(voice, [words], () => [createElement("p", { textContent: words })])
     } else {
-      const sentences = chapter.see(experiment.facts)
-      this.say(sentences, () => this.answer(sentences, chapter.count?.(experiment.facts)))
+      const sentences = chapter.see(facts)
+      this.say(voice, sentences, () => this.answer(sentences))
     }
+    const [count, aside] = stage === 2 || (stage && chapter.live) ? [chapter.count?.(facts), experiment.aside] : []
+    this.say(extra, [JSON.stringify([count, aside])], () => [count && sumOf(count), aside && looked(aside)].filter(Boolean))
   }
 
-  /** Replace the text by parts(), if its words change. */
-  say(words, parts) {
-    const { voice } = this, text = words.join(" ")
-    if (voice.dataset.text === text) return
-    voice.dataset.text = text
-    voice.replaceChildren(...parts())
+  /** Replace the contents of an element by parts(), if its words change. */
+  say(element, words, parts) {
+    const text = words.join(" ")
+    if (element.dataset.text === text) return
+    element.dataset.text = text
+    element.replaceChildren(...parts())
   }
 
-  /** The answer next to the prediction, with its reason, the surprise, and the count or a picture. */
-  answer([reason, surprise], rows) {
+  /** The answer next to the prediction, with its reason, the surprise and more. */
+  answer(sentences) {
     const { chapter, experiment, prediction } = this
     const verdict = createElement("p", { className: "verdict" })
     const is = chapter.verdict?.(experiment.facts, prediction) ?? { answer: `It is ${this.named(experiment.answer)}.`, so: "" }
     verdict.append(createElement("b", { textContent: is.answer }), ` You predicted ${this.named(prediction)}${is.so}.`)
-    const parts = [verdict, createElement("p", { textContent: reason }), createElement("p", { textContent: surprise })]
-    if (rows) parts.push(sumOf(rows))
-    if (experiment.aside) parts.push(this.aside ??= looked(experiment.aside))
-    return parts
+    return [verdict, ...sentences.map((innerHTML) => createElement("p", { innerHTML }))]
   }
 }
 

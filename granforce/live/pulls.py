@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from granforce.explore.intervals import intervals
 from granforce.explore.outline import extremes
 from granforce.explore.pull import Pull, Reach, pull, reach
 from granforce.forces.build import ensemble
@@ -113,6 +114,19 @@ class Puller:
         Raises the errors of `loaded_networks`.
         """
         return loaded_networks(self._S, contact, np.linspace(0.0, load, LOADS))
+
+    def band(self, contact: int, loads: Floats) -> Floats:
+        """Least and largest f_n (k, 2) of a contact under force pairs on it (k,), in force.
+
+        Raises the errors of `intervals`.
+        """
+        S = self._S
+        pair = np.zeros((len(S.index), 2))
+        pair[S.position(contact), 0] = 1.0
+        turned = S.A @ S.to_vector(pair)
+        under = [replace(S, b=S.b - load * turned, computed=None) for load in loads]
+        exact = [intervals(one, [contact]) for one in under]
+        return np.array([[one.low[0, 0], one.high[0, 0]] for one in exact])
 
     def given_way(self, contact: int, state: Floats, limit: float) -> GivenWay:
         """How a contact with this limit load (force) gives way, from the network `state` (N_c, 2).

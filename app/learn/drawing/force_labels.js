@@ -4,6 +4,7 @@ import { distance } from "../model/polytope.js"
 import { number } from "../model/sentences.js"
 
 const NAMED = 30 // px: least length of a component with a label
+const SMALL = 300 // px: height of a drawing in which values have no names
 const ROOMY = 70 // px: least radius of a disk inside which these labels have room
 export const ASIDE = 9 // px between friction and the wall that would cover it
 
@@ -14,7 +15,7 @@ export function drawValues(arrows, F) {
   g.textAlign = "center"
   g.textBaseline = "middle"
   for (const [force, colour] of look.axes ?? []) {
-    const text = `${force % 2 ? "tangential" : "normal"} ${number(F[force])}`, wide = g.measureText(text).width / 2 + 3
+    const text = `${arrows.easel.high < SMALL ? "" : force % 2 ? "tangential " : "normal "}${number(F[force])}`, wide = g.measureText(text).width / 2 + 3
     const ends = arrows.ends().filter(({ contact }) => contact === force >> 1), { at, across } = ends[0]
     const inward = ends.reduce((sum, end) => sum.map((v, k) => v + end.inward[k]), [0, 0]) // 0 between two disks
     const out = wide * Math.abs(across[0]) + 13, along = Math.max(0.3 * body.scene.r[ends[0].disk] * arrows.unit, wide + 4) // clear of a wall
@@ -52,7 +53,7 @@ export function drawNames(arrows, F) {
     const both = fits(rubs.join(" ")) ? [rubs.join(" ")] : rubs
     const name = ["force from the ", ""].map((before) => scene.names[contact].replace("at the ", before)).find(fits) ?? ""
     const pressed = ["normal force", "normal"].map((word) => `${word} ${number(n)}`).find(fits) ?? number(n)
-    const lines = [name, pressed, ...both]
+    const lines = look.unnamed ? [name] : [name, pressed, ...both]
     const foot = arrows.outline(0) && px < cx - NAMED ? "left" : undefined // away from the weight
     const side = Math.abs(ux) < 0.3 ? name.match(/(left|right) end/)?.[1] ?? foot : ux > 0 ? "right" : "left" // away from the other end
     write(x, py + 34 * uy, lines, { left: "right", right: "left" }[side] ?? "center")

@@ -23,15 +23,15 @@ export function drawSegment(space) {
     const [x, y] = ends[side.corners[0]], lit = space.lit(side), words = side.cap ? "no end this way" : space.handler("words", side)
     const text = g.measureText(words).width > 0.45 * easel.wide ? words.replace(/, | (?=and (?:at|between) )/, "\n") : words
     const wide = Math.max(...text.split("\n").map((part) => g.measureText(part).width)), high = text.includes("\n") ? 40 : 30
-    const close = before && Math.abs(before.x - x) < (before.wide + wide) / 2 + 12
+    const middle = Math.min(Math.max(x, wide / 2 + 5), easel.wide - wide / 2 - 5) // as written
+    const close = before && Math.abs(before.x - middle) < (before.wide + wide) / 2 + 12
     if (side.cap) space.drawOn([x, y], 7)
     else { g.fillStyle = lit ? look.hand : look.cold; g.fillRect(x - 3, y - 13, 6, 26) }
-    const above = y - high - (close ? 34 : 0)
+    const above = y - high - (close ? 44 : 0)
     space.write(x, above, text, lit ? look.hand : look.ink)
-    const middle = Math.min(Math.max(x, wide / 2 + 5), easel.wide - wide / 2 - 5) // as written
     space.free([middle, above], wide, 16 * text.split("\n").length)
     space.labels.push({ side, x, y, reach: 30 })
-    before = { x, wide }
+    before = { x: middle, wide }
   }
 }
 

@@ -5,7 +5,8 @@ const NS = "http://www.w3.org/2000/svg"
 const PILL = { high: 26, letter: 6.8, padding: 18 } // px
 const GAP = 5 // px between a line and words next to it
 const GRAB = 26 // px from the dot within which dragging does not move it
-const STEPS = 60 // keyboard steps along an axis
+const STEPS = 60, FAST = 5 // keyboard steps along an axis; with the Shift key, so many at once
+let plots = 0 // so far: names what clips them
 
 function element(parent, tag, attributes = {}) {
   const child = parent.appendChild(document.createElementNS(NS, tag))
@@ -30,9 +31,9 @@ class Scale {
   }
 
   /** The value one keyboard step further: the next stop, if there are stops. */
-  step(value, sign) {
+  step(value, sign, fast) {
     const { stops } = this.axis
-    if (!stops) return this.value(this.px(value) + (sign * (this.to - this.from)) / STEPS)
+    if (!stops) return this.value(this.px(value) + ((fast ? FAST : 1) * sign * (this.to - this.from)) / STEPS)
     const further = stops.filter((stop) => sign * (stop - value) > 1e-9 * stop)
     return (sign > 0 ? further[0] : further.at(-1)) ?? value
   }
@@ -52,9 +53,12 @@ export class QuantityPlot {
     Object.assign(this, { host, axes: { x, y, second }, hears, allowed: null, state: {} })
     const svg = this.svg = element(host, "svg", { role: "group", "aria-label": x.label })
     this.frame = element(svg, "g")
-    this.exact = element(svg, "path", { class: "exact" })
+    const inside = `inside${++plots}`, clip = { "clip-path": `url(#${inside})` }
+    this.inside = element(element(svg, "clipPath", { id: inside }), "rect")
+    this.exact = element(svg, "path", { class: "exact", ...clip })
+    this.further = element(svg, "path", { class: "further" })
     this.second = element(svg, "path", { class: "second" })
-    this.seen = element(svg, "path", { class: "visited" })
+    this.seen = element(svg, "path", { class: "visited", ...clip })
     this.dots = element(svg, "path", { class: "dots" })
     this.lines = element(svg, "g", { class: "lines" })
     this.answer = this.flag("answer")
@@ -81,14 +85,15 @@ export class QuantityPlot {
     const left = this.axes.y ? 66 : 26, bottom = high - 54, end = wide - (this.axes.second ? 62 : 26)
     Object.assign(this, { wide, high, left, bottom, end, top: 44 })
     this.x = new Scale(this.axes.x, left, end)
-    this.y = this.axes.y ? new Scale(this.axes.y, bottom - PILL.high - 16, this.top) : null // leaves room for the prediction below
+    this.y = this.axes.y ? new Scale(this.axes.y, bottom - (this.hears.marker ? PILL.high + 16 : 10), this.top) : null // leaves room for a prediction below
     this.right = this.axes.second ? new Scale(this.axes.second, this.y.from, this.y.to) : null
+    for (const [key, value] of Object.entries({ x: left, y: this.y?.to ?? 0, width: end - left, height: (this.y?.from ?? bottom) - (this.y?.to ?? 0) })) this.inside.setAttribute(key, value)
     this.drawAxes()
     this.draw(this.state)
   }
 
   /** Height of the drawing for a single quantity. */
-  get level() { return (this.top + this.bottom) / 2 }
+  get level() { return (this.top + this.bottom) / 2 - 8 }
 
   place([x, y]) { return [this.x.px(x), this.y ? this.y.px(y) : this.level] }
 
@@ -131,6 +136,7 @@ export class QuantityPlot {
       part.classList.toggle("filled", area)
       part.classList.toggle("thin", thin || area !== filled)
     }
+    this.further.setAttribute("d", this.beyond(exact))
     this.second.setAttribute("d", second.map(([x, y]) => `M${this.x.px(x)} ${this.right.px(y)}h0`).join(""))
     this.drawLines(lines)
     this.dots.setAttribute("d", dots.map((point) => `M${this.place(point).map((v) => v.toFixed(1)).join()}h0`).join(""))
@@ -141,7 +147,7 @@ export class QuantityPlot {
       const [px, py] = this.place(now)
       this.dot.setAttribute("transform", `translate(${px} ${py})`)
       this.reading.setAttribute("x", this.beside(px, (words.length * PILL.letter) / 2, [marker, answer, ...lines]))
-      this.reading.textContent = answer && Math.abs(this.x.px(answer.value) - px) < GAP ? "" : words
+      this.reading.textContent = [answer, ...lines].some((flag) => flag && Math.abs(this.x.px(flag.value) - px) < GAP) ? "" : words
       this.dot.setAttribute("aria-valuetext", words)
       this.dot.setAttribute("aria-valuenow", now[0])
     }
@@ -149,6 +155,20 @@ export class QuantityPlot {
       this.marker.group.setAttribute("aria-valuenow", marker.value)
       this.marker.group.setAttribute("aria-valuetext", marker.words)
     }
+  }
+
+  /** Heads of arrows where an area or a bar leaves the axes, on the right and at the top. */
+  beyond(points) {
+    return [this.x, this.y].map((scale, d) => {
+      const other = d ? this.x : this.y, high = scale?.axis.high
+      const met = points.flatMap((b, k) => {
+        const a = points.at(k - 1), part = (high - a[d]) / (b[d] - a[d]), at = a[1 - d] + part * (b[1 - d] - a[1 - d])
+        return part >= 0 && part <= 1 ? [other ? Math.min(other.axis.high, Math.max(other.axis.low, at)) : at] : []
+      })
+      if (!met.length || !points.some((point) => point[d] > 1.001 * high)) return ""
+      const [x, y] = this.place(d ? [(Math.min(...met) + Math.max(...met)) / 2, high] : [high, (Math.min(...met) + Math.max(...met)) / 2])
+      return d ? `M${x} ${y - 13}l-9 14h18z` : `M${x + 13} ${y}l-14 -9v18z`
+    }).join("")
   }
 
   /** Where to write words of this half width above px, relative to it: on the plot, next to the vertical lines. */
@@ -235,10 +255,10 @@ export class QuantityPlot {
     if (right === undefined || !this.movable) return
     event.preventDefault()
     event.stopPropagation()
-    if (this.movable === "marker") return this.hears.marker(this.x.step(this.state.marker.value, right || up))
+    if (this.movable === "marker") return this.hears.marker(this.x.step(this.state.marker.value, right || up, event.shiftKey))
     const [x, y] = this.state.now
-    if (!this.y) return this.hears.dot(this.x.step(x, right || up), 0)
-    this.hears.dot(right ? this.x.step(x, right) : x, up ? this.y.step(y, up) : y)
+    if (!this.y) return this.hears.dot(this.x.step(x, right || up, event.shiftKey), 0)
+    this.hears.dot(right ? this.x.step(x, right, event.shiftKey) : x, up ? this.y.step(y, up, event.shiftKey) : y)
   }
 }
 

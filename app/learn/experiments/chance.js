@@ -26,6 +26,7 @@ export class Chance extends PackingExperiment {
     const { packing, contact, share } = this, { least, largest, low, high } = packing
     return {
       ...this.counted(packing), low: least[contact], high: largest[contact], share, states: packing.states,
+      step: this.drawn[2].number - this.drawn[1].number, between: high[contact] - Math.max(...this.drawn.map(([x]) => x)) > 0.005,
       part: (high[contact] - low[contact]) / (largest[contact] - least[contact]),
     }
   }

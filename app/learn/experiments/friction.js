@@ -1,7 +1,7 @@
-// The same number of disks packed with increasing friction. The plot has the means of the study at
-// every stop; the picture shows the stored packing with the nearest friction, running through its
-// networks.
+// The same number of disks packed with increasing friction: at every stop, the picture and the numbers are
+// those of one packing, which runs through its networks.
 
+import { unflat } from "../../browser/canvas_paths.js"
 import { STILL } from "../../browser/motion.js"
 import { PackingExperiment } from "./packing_experiment.js"
 
@@ -12,28 +12,26 @@ const nearest = (list, mu) => list.reduce((one, other) => (Math.abs(Math.log(oth
 
 export class Friction extends PackingExperiment {
   async load(source) {
-    const { mu, spread, packed, touching, free } = await source.get("curve")
-    Object.assign(this, { stops: [...mu], spreads: [...spread], packed: [...packed], touching: [...touching], free: [...free], packings: new Map(), visited: new Set() })
+    const { mu, spread, free, means } = await source.get("curve")
+    Object.assign(this, { stops: [...mu], spreads: [...spread], free: [...free], means: unflat([...means]) ?? [], packings: new Map(), visited: new Set() })
     this.value = nearest(this.stops, START)
-    const fetch = (one) => source.get("packing", String(one)).then((packing) => this.packings.set(one, packing))
-    const fetched = new Map([...new Set(this.packed)].map((one) => [one, fetch(one)]))
-    await fetched.get(this.packed[this.stops.indexOf(this.value)])
+    const fetched = this.stops.map((one) => source.get("packing", String(one)).then((packing) => this.packings.set(one, packing)))
+    this.fetched = Promise.all(fetched)
+    await fetched[this.stops.indexOf(this.value)]
     this.go()
-    for (const one of fetched.values()) one.then(() => this.go(), () => {}) // packings that are missing are not shown
     this.frame = requestAnimationFrame((time) => this.play(time))
   }
 
-  /** Show the packing of the present stop, once it is there. */
+  /** A promise: dragging has to wait for all packings. */
+  ready() { return this.fetched }
+
+  /** Show the packing of the present stop. */
   go() {
-    const { packings, packed, stops, value, visited } = this, packing = packings.get(packed[stops.indexOf(value)])
-    if (packing && packing !== this.packing) {
-      this.packing = packing
-      this.network = Float32Array.from(this.asPacked(packing))
-      this.before = this.asPacked(packing)
-      this.canvas.show(packing, packing.grabbed)
-      this.say(`picture: a packing made at μ = ${packing.mu}`)
-    }
-    this.answered ||= visited.size === stops.length
+    const packing = this.packing = this.packings.get(this.value)
+    this.network = Float32Array.from(this.asPacked(packing))
+    this.before = this.asPacked(packing)
+    this.canvas.show(packing, packing.grabbed)
+    this.answered ||= this.visited.size === this.stops.length
     this.changed()
   }
 
@@ -52,14 +50,15 @@ export class Friction extends PackingExperiment {
   get answer() { return this.stops[this.spreads.indexOf(Math.max(...this.spreads))] }
 
   get facts() {
-    const { packing, stops, spreads, touching, free } = this
-    return { ...this.counted(packing), rows: stops.map((mu, k) => ({ mu, touching: touching[k], free: free[k], spread: spreads[k] })) }
+    const { packing, packings } = this
+    return { ...this.counted(packing), spread: packing.spread, rows: [...packings.values()].sort((one, other) => one.mu - other.mu) }
   }
 
   /** Move to the nearest stop, past all stops on the way. */
   drag(x) {
     const { stops, value } = this, to = nearest(stops, x), [low, high] = [Math.min(to, value), Math.max(to, value)]
     for (const stop of stops) if (stop >= low && stop <= high) this.visited.add(stop)
+    if (to === value) return
     this.value = to
     this.go()
   }
@@ -68,11 +67,11 @@ export class Friction extends PackingExperiment {
   finish({ x }) { for (const to of [x.low, x.high, this.answer]) this.drag(to) }
 
   get picture() {
-    const { stops, spreads, free, value, visited, answered } = this, now = stops.indexOf(value), curve = stops.map((mu, k) => [mu, spreads[k]])
+    const { stops, spreads, free, value, visited, answered, means } = this, now = stops.indexOf(value), curve = stops.map((mu, k) => [mu, spreads[k]])
     const been = ([mu]) => mu === value || visited.has(mu)
     return {
-      now: curve[now], words: `μ = ${value}: ${free[now].toFixed(0)} free`, dots: curve.filter(been),
-      second: stops.map((mu, k) => [mu, free[k]]).filter(been), thin: true, exact: answered ? curve : [],
+      now: curve[now], words: `μ = ${value}`, dots: curve.filter(been),
+      second: stops.map((mu, k) => [mu, free[k]]).filter(been), thin: true, exact: answered ? means : [],
     }
   }
 

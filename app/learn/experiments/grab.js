@@ -2,6 +2,7 @@
 // marked one is asked for, but any other can be dragged too, from the network on screen.
 
 import { networkAt } from "../../packing/replay/replay.js"
+import { OPENS } from "../../packing/drawing/first_motion.js"
 import { hull } from "../model/polytope.js"
 import { SceneInHand } from "../model/scene_in_hand.js"
 import { PackingExperiment } from "./packing_experiment.js"
@@ -28,12 +29,8 @@ export class Grab extends PackingExperiment {
   get answer() { return this.packing.largest[this.contact] }
 
   get facts() {
-    const { packing, contact, first: rail } = this, count = packing.contacts
-    const last = (marks) => marks.subarray(count).reduce((sum, v) => sum + v, 0)
-    return {
-      ...this.counted(packing), start: this.start, low: packing.least[contact], high: packing.largest[contact], changed: this.changes,
-      opened: rail ? last(rail.opened) : 0, sliding: rail ? last(rail.sliding) : 0,
-    }
+    const { packing, contact } = this
+    return { ...this.counted(packing), start: this.start, low: packing.least[contact], high: packing.largest[contact], changed: this.changes, ...this.atEnd }
   }
 
   /** A promise: dragging has to wait for the first rail. */
@@ -44,6 +41,15 @@ export class Grab extends PackingExperiment {
     const { first, contact } = this
     const end = first?.normal.subarray(-this.packing.contacts) ?? []
     return end.reduce((sum, v, c) => sum + (Math.abs(v - this.before[c]) > CHANGED && c !== contact ? 1 : 0), 0)
+  }
+
+  /** At the end of the first rail: contacts that are open or slip, and disks that have lost all their contacts. */
+  get atEnd() {
+    const { packing: { contacts, contact, i, j }, first: rail } = this
+    const [normal, tangential] = ["normal", "tangential"].map((name) => rail?.[name].subarray(-contacts) ?? [])
+    const marks = this.marks(normal, tangential), held = new Set(), touched = new Set([...i, ...j])
+    contact.forEach((c, k) => { if (marks[c] !== OPENS) for (const disk of [i[k], j[k]]) held.add(disk) })
+    return { opened: marks.filter((mark) => mark === OPENS).length, sliding: marks.filter((mark) => mark === 1).length, bare: rail ? touched.size - held.size : 0 }
   }
 
   drag(x) {

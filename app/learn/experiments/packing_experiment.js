@@ -22,10 +22,13 @@ export class PackingExperiment {
   /** The first network of a packing, in which it came to rest. */
   asPacked(packing) { return packing.normal.subarray(0, packing.contacts) }
 
-  /** Contacts that are open, or slip, on the network on screen, as in drawLimits; null if it has no friction. */
-  get limited() {
-    const { network, tangential, packing: { mu } } = this
-    return tangential && Uint8Array.from(network, (v, c) => (v < AT_LIMIT ? OPENS : Number(mu * v - Math.abs(tangential[c]) < AT_LIMIT)))
+  /** Contacts that are open, or slip, on the network on screen; null if it has no friction, and before a prediction. */
+  get limited() { return this.locked || !this.tangential ? null : this.marks(this.network, this.tangential) }
+
+  /** Contacts of a network that are open, or slip, as in drawLimits. */
+  marks(normal, tangential) {
+    const { mu } = this.packing
+    return Uint8Array.from(normal, (v, c) => (v < AT_LIMIT ? OPENS : Number(mu * v - Math.abs(tangential[c]) < AT_LIMIT)))
   }
 
   // The hand in the picture: no effect, except in chapters that override these

@@ -89,6 +89,16 @@ export class Push extends PackingExperiment {
     return { now: [value, 0], seen: [[0, 0], [value, 0]], lines: answered ? [bound, ...limits.slice(1)] : [] }
   }
 
+  /** S on the force of the line, against the push, and the force of this network until disks move. */
+  get aside() {
+    const { options, path: { values, normal, band, contact, limit }, packing: { contacts }, limit: most } = this
+    const rows = Array.from({ length: band.length / 3 }, (_, k) => band.subarray(3 * k, 3 * k + 3)), edge = (d) => rows.map((row) => [row[0], row[d]])
+    return {
+      axes: options, filled: true, walk: true, exact: [...edge(1), ...edge(2).reverse()], seen: Array.from(values, (push, k) => [push, normal[k * contacts + contact]]),
+      answer: { value: most, words: `disks move: ${most.toFixed(2)}` }, lines: [{ value: limit, words: `S ends: ${limit.toFixed(2)}` }],
+    }
+  }
+
   stop() {
     this.sway?.take(null)
     super.stop()

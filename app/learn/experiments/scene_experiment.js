@@ -5,12 +5,15 @@ import { STILL } from "../../browser/motion.js"
 import { unflat } from "../../browser/canvas_paths.js"
 import { Arrows } from "../drawing/scene_canvas.js"
 import { fixed } from "../model/middle.js"
-import { area, hull } from "../model/polytope.js"
+import { area, dot, hull } from "../model/polytope.js"
 import { palette } from "../drawing/palette.js"
 import { SceneInHand } from "../model/scene_in_hand.js"
+import { stopping } from "../model/sentences.js"
+import { createElement } from "../../browser/dom.js"
 
 const FOUND = 0.01 // relative distance from an end at which it counts as found
 const ROUND = 0.9 // part of S that a path round it has to enclose
+const ENDLESS = 100 // of the loads: how far an unbounded S is drawn, beyond all axes
 const STEPS = 20, SECONDS = 0.4 // to other forces behind the same dot
 const FRICTION = { label: "friction μ", max: 1.2, step: 0.05, stage: 2 }
 
@@ -21,14 +24,15 @@ export class SceneExperiment {
    */
   constructor(host, options, changed) {
     Object.assign(this, { host, options, changed, steered: true, locked: true, answered: false, lit: new Set(), way: [] })
-    this.canvas = host.appendChild(document.createElement("canvas"))
-    Object.assign(this.canvas, { role: "img", ariaLabel: "What is in balance, and the force on it at every contact" })
+    this.canvas = host.appendChild(createElement("canvas", { role: "img", ariaLabel: "What is in balance, and the force on it at every contact" }))
+    this.label = host.appendChild(createElement("div", { className: "label" }))
     this.arrows = new Arrows(this.canvas, (what, given) => this.respond(what, given))
   }
 
   async load(source) {
     const scene = this.scene = await source.get("scene", this.options.scene)
     this.hand = new SceneInHand(scene, () => {})
+    this.begun = this.body.u
     this.start = this.at
     this.mean = this.body.sumAt(this.body.u) / this.body.count
     this.ends = this.body.whole ? this.end() : source.get("ends", this.options.scene).then(({ mu, bounds, outlines }) => {
@@ -45,7 +49,10 @@ export class SceneExperiment {
   /** S at the present friction: [least, largest] value of the quantity, and the corners on its axes. */
   measured() {
     const { body, options: { x }, known } = this
-    if (!known) return { bounds: body.empty ? [] : body.interval(x), outline: hull(body.corners.map(({ u }) => this.flat(u))) }
+    if (!known) {
+      const far = ENDLESS * body.scaleOf(), ends = body.corners.flatMap(({ u }) => [u, ...body.rays.map((ray) => u.map((v, d) => v + far * ray[d]))])
+      return { bounds: body.empty ? [] : body.interval(x), outline: hull(ends.map((u) => this.flat(u))) }
+    }
     return body.empty ? { bounds: [], outline: [] } : known.find(({ mu }) => Math.abs(mu - body.mu) < 1e-9)
   }
 
@@ -74,6 +81,14 @@ export class SceneExperiment {
     if (low === undefined) return { value, words: `${mu}: S is empty. No forces hold the ${one}${body.scene.r.length > 1 ? "s" : ""}: motion begins.` }
     if (high === Infinity) return { value, words: `${mu}: S has no end. Forces lock between the walls, as large as you like.` }
     return { value, words: high - low < 1e-6 ? `${mu}: S is one point, ${low.toFixed(2)}. Nothing is left open.` : `${mu}: from ${low.toFixed(2)} to ${high.toFixed(2)}` }
+  }
+
+  /** What is about to slip or to open where the dot is, at the edge of S, in words. */
+  get edge() {
+    const { body } = this, met = ({ slope, rest }) => Math.abs(dot(slope, body.u) + rest) < 1e-6 * body.scaleOf()
+    if (this.locked || !body.whole || body.empty || body.corners.length < 2) return ""
+    const stops = body.rows.filter(met).map(({ contact, what }) => [contact, what])
+    return stopping(body, { stops })
   }
 
   // Forces
@@ -175,12 +190,15 @@ export class SceneExperiment {
     return false
   }
 
+  /** Whether the force shown is the one asked for. */
+  get hidden() { return this.locked && this.options.goal === "both" }
+
   /** The contents of the plot. */
   get picture() {
     const { way, answered, varied, options: { goal, y }, S, body } = this
     const round = goal === "round" && !this.locked && !answered ? `, ${Math.round(100 * this.enclosed)} % of S` : ""
     return {
-      now: body.empty ? null : this.at, words: `now ${this.value.toFixed(2)}${round}`,
+      now: body.empty || this.hidden ? null : this.at, words: `now ${this.value.toFixed(2)}${round}`,
       seen: way, exact: answered ? S.outline : [], filled: y !== null, unanswered: varied || goal === "both",
     }
   }
@@ -189,11 +207,15 @@ export class SceneExperiment {
     const { arrows, hand, canvas, options: { x, y } } = this
     if (!hand || !canvas.clientWidth) return
     if (arrows.body !== hand.body || arrows.wide !== canvas.clientWidth) {
-      arrows.fit(hand.body)
+      const { body } = hand, { u } = body
+      body.u = this.begun // the same scale, wherever the dot is
+      arrows.fit(body)
+      body.u = u
       arrows.wide = canvas.clientWidth
     }
+    this.label.textContent = this.edge
     const colours = palette(dark), axes = new Map(y === null ? [] : [[x, colours.across], [y, colours.up]])
-    arrows.draw({ ...colours, axes, contacts: this.lit, contact: null, disk: null, fall: null })
+    arrows.draw({ ...colours, axes, contacts: this.lit, contact: null, disk: null, fall: null, unnamed: this.hidden })
   }
 
   stop() { cancelAnimationFrame(this.frame) }

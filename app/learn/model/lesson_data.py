@@ -12,6 +12,7 @@ from granforce.live.pulls import Puller
 from granforce.records import InputError, NotJammedError, float_array
 from granforce.study import kinds
 from granforce.study.cells import entries
+from granforce.types import Floats
 
 from ...packing.legend import exact_intervals
 from ...packing.player import frames
@@ -27,10 +28,8 @@ STRONG = 1.5  # least force of the contact that is pulled, ⟨f_n⟩
 FIRM = 0.5  # least critical force of the contact that is pushed, ⟨f_n⟩
 STARTS = 4  # networks from which it is pushed: as packed, and others of the stored walk
 
+BAND = np.linspace(0, 0.9999, 9)  # pushes at which S is measured, relative to the limit load
 FRICTIONS = [round(0.05 * k, 2) for k in range(25)]  # of a small scene, as its slider has them
-
-# Curves against friction, by the measures of which they are means.
-CURVES = {"spread": "eta1", "touching": "coordination", "free": "dimension"}
 
 
 @lru_cache
@@ -70,6 +69,7 @@ class Packings:
             if cell.series == series and cell.mu > 0:
                 self.cells[cell.mu] = cell
         self.rail = lru_cache(1)(self._rail)
+        self.band = lru_cache(1)(self._band)
         self.push = lru_cache(STARTS)(self._push)
         self.shadow = lru_cache(1)(self._shadow)
 
@@ -163,10 +163,21 @@ class Packings:
             "number": int(replay.number[row]),
             **path(pushed.under, scale),
             "limit": limit / scale,
+            "band": np.ravel(self.band()) / scale,
             "opened": motion.opened.astype(np.uint8),
             "slid": motion.slid.astype(np.uint8),
             "displacement": np.nan_to_num(motion.displacement).ravel(),
         }
+
+    def _band(self) -> Floats:
+        """Least and largest f_n of the pushed contact under pushes up to its limit load.
+
+        (k, 3): push, least, largest; in force.
+        """
+        position, limit = self._weakened()
+        contact = int(self.shown(MU).replay.backbone[position])
+        pushes = limit * BAND
+        return np.column_stack([pushes, self._puller().band(contact, pushes)])
 
     def _weakened(self) -> tuple[int, float]:
         """The contact to push, and its limit load.
@@ -183,24 +194,18 @@ class Packings:
         return int(contacts[row]), float(limit[row])
 
     def curve(self) -> dict[str, Any]:
-        """Forces and contacts against friction, and the friction of the nearest packing.
+        """Of the packing at each friction, the variation of forces and the free numbers.
 
-        spread: variation of forces; touching: contacts per disk; free: free numbers. They are means
-        over the packings of the study or, without a study, those of each packing.
+        means: friction and mean variation of forces over the packings of the study, flat.
         """
-        frictions = self.frictions
-        measured = [dict(study_data.against_friction(name)) for name in CURVES.values()]
-        stops = [mu for mu in measured[0] if frictions and frictions[0] <= mu <= frictions[-1]]
-        if not stops:
-            stops = frictions
-            summaries = [self.shown(mu).replay.summary for mu in frictions]
-            measured = [{one["mu"]: one[name] for one in summaries} for name in CURVES.values()]
-        packed = [min(frictions, key=lambda one: abs(np.log(one / mu))) for mu in stops]
-        curves = {
-            name: [float(values[mu]) for mu in stops]
-            for name, values in zip(CURVES, measured, strict=True)
+        frictions, means = self.frictions, study_data.against_friction("eta1")
+        summaries = [self.shown(mu).replay.summary for mu in frictions]
+        return {
+            "mu": frictions,
+            "spread": [one["eta1"] for one in summaries],
+            "free": [one["dimension"] for one in summaries],
+            "means": np.ravel([one for one in means if frictions[0] <= one[0] <= frictions[-1]]),
         }
-        return {"mu": stops, "packed": packed, **curves}
 
     def _pushed(self) -> xr.Dataset:
         """The stored pushed contacts of the packing."""

@@ -92,11 +92,11 @@ def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
         expect(more.filter(visible=True)).to_have_count(int(name in SCENES))
         told = page.locator(".voice").inner_text()
         assert answer is None or f" {answer}." in told, name
-        assert "You predicted" in told and COUNTS.get(name, "") in told
-        answers[name] = re.search(r"It is (\d[\d.]*\d)\.|$", told)[1]
         words = page.locator("article").inner_text()
+        assert "You predicted" in told and COUNTS.get(name, "") in words
+        answers[name] = re.search(r"It is (\d[\d.]*\d)\.|$", told)[1]
         assert "S, all sets of forces" in words or name in (*SCENES, "chance", "push"), name
-        assert ("− 2" in told and "+ 1" in told) == (name == "thirteen"), name
+        assert ("− 2" in words and "+ 1" in words) == (name == "thirteen"), name
         if name != "push":
             page.get_by_role("button", name="Next").click()
     expect(page.get_by_title("done")).to_have_count(8)
@@ -167,10 +167,18 @@ def test_the_way_back_from_more_disks_leads_to_the_same_chapter(opening, lesson)
     predict(page)
     friction = page.get_by_role("slider", name="friction μ")
     expect(friction).to_be_hidden()
-    press(page, RIGHT)
+    press(page, ["Shift+ArrowRight"] * 12)
     for mu, words in (("0.8", "from 0.39 to 3.54"), ("0", "one point, 0.71"), ("1", "no end")):
         friction.fill(mu)
         page.get_by_text(f"μ = {mu}: ").filter(has_text=words).wait_for()
+    # An unbounded S leaves the plot, marked by an arrow.
+    bar = [
+        float(x) for x in re.findall(r"([\d.]+),", page.locator("path.exact").get_attribute("d"))
+    ]
+    assert max(bar) > page.locator("figure.plot").bounding_box()["width"]
+    assert page.locator("path.further").get_attribute("d")
+    friction.fill("0.5")
+    assert not page.locator("path.further").get_attribute("d")
     page.get_by_role("link", name="More with these disks").click()
     page.get_by_role("button", name="Random walk").wait_for()
     page.go_back()
@@ -230,6 +238,20 @@ def test_behind_one_point_of_the_shadow_lie_other_forces(opening, lesson):
     expect(change).to_be_hidden()
 
 
+def test_the_numbers_under_the_friction_plot_are_those_of_the_packing_on_screen(opening, lesson):
+    page = opening("?learn=friction", 1280, 900, first=True, at=lesson)
+    page.locator("article strong").wait_for()
+    predict(page, 1)
+    press(page, [])
+    for key in (None, "ArrowRight", "ArrowRight"):
+        if key:
+            dot(page).press(key)
+        mu, contacts = (scene(page, f"scene.geometry.{name}") for name in ("mu", "contacts"))
+        rows = page.locator(".extra tr").all_inner_texts()
+        assert rows[0].startswith(f"μ = {mu:g}: ") and f"2 × {contacts} " in rows[1]
+        assert dot(page).get_attribute("aria-valuetext") == f"μ = {mu:g}"
+
+
 def test_the_same_disks_are_pushed_from_other_forces_and_every_limit_stays(opening, lesson):
     page = opening("?learn=push", 1280, 900, first=True, at=lesson)
     page.locator("article strong").wait_for()
@@ -254,8 +276,8 @@ def test_the_same_disks_are_pushed_from_other_forces_and_every_limit_stays(openi
     assert 0 < float(dot(page).get_attribute("aria-valuenow")) < first
     page.mouse.up()
     press(page, RIGHT)
-    page.get_by_text("The same disks gave way at").wait_for()
     second = float(dot(page).get_attribute("aria-valuenow"))
+    page.get_by_text(f"It is {first:.2f} with the forces as packed, {second:.2f} with").wait_for()
     assert abs(second - first) > 0.05
     page.locator("figure").get_by_text(re.compile(rf"^network \d+: {second:.2f}$")).wait_for()
 

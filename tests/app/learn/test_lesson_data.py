@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from app.learn.model.lesson_data import Packings
-from app.results import study_data
 from app.results.library import Library
 
 
@@ -13,19 +12,25 @@ def packings(tmp_path_factory):
     return Packings(Library(cache=tmp_path_factory.mktemp("cache")))
 
 
-def test_friction_stops_wherever_the_study_measured_and_shows_the_nearest_packing(packings):
+def test_friction_stops_at_the_packings(packings):
     curve = packings.curve()
-    packed = dict(zip(curve["mu"], curve["packed"], strict=True))
-    assert len(packed) > 2 * len(packings.frictions)
-    assert all(packed[mu] == mu for mu in packings.frictions)
-    assert (packed[0.14], packed[0.02], packed[5.0]) == (0.1, 0.01, 10.0)
+    assert curve["mu"] == packings.frictions
+    assert curve["free"] == [packings.packing(mu)["free"] for mu in packings.frictions]
     assert max(zip(curve["spread"], curve["mu"], strict=True))[1] == 0.2
+    assert (np.diff(curve["free"]) < 0).all()
+    means = curve["means"].reshape(-1, 2)
+    assert means[np.argmax(means[:, 1]), 0] == 0.2 and len(means) > len(curve["mu"])
 
 
-def test_more_friction_leaves_fewer_contacts_and_fewer_free_numbers(packings):
-    curve = packings.curve()
-    for name in ("touching", "free"):
-        assert (np.diff(curve[name]) < 0).all(), name
+def test_s_of_the_pushed_contact_shrinks_to_a_point_at_its_limit_load(packings):
+    pushed = packings.push(0)
+    load, least, largest = pushed["band"].reshape(-1, 3).T
+    assert (np.diff(largest - least) < 0).all() and largest[-1] < 1e-3 * largest[0]
+    assert load[-1] == pytest.approx(pushed["limit"], rel=1e-3)
+    forces = pushed["normal"].reshape(len(pushed["values"]), -1)[:, pushed["contact"]]
+    assert (forces > np.interp(pushed["values"], load, least) - 1e-3).all()
+    assert (forces < np.interp(pushed["values"], load, largest) + 1e-3).all()
+    assert forces[-1] < 1e-3  # it meets the edge before
 
 
 def test_the_same_disks_give_way_at_other_pushes_from_other_forces(packings):
@@ -38,13 +43,6 @@ def test_the_same_disks_give_way_at_other_pushes_from_other_forces(packings):
     np.testing.assert_allclose(first, packings.shown(0.1).replay.normal[0], atol=1e-5)
     assert np.abs(other["normal"][: len(first)] - first).max() > 0.5
     assert packed["opened"].any() and packed["displacement"].any()
-
-
-def test_without_a_study_friction_stops_at_the_packings(packings, monkeypatch):
-    monkeypatch.setattr(study_data, "against_friction", lambda measure: [])
-    curve = packings.curve()
-    assert curve["mu"] == curve["packed"] == packings.frictions
-    assert curve["spread"] == [packings.packing(mu)["spread"] for mu in packings.frictions]
 
 
 def test_the_walk_fills_a_small_part_of_the_shadow_of_s(packings):
