@@ -11,14 +11,11 @@ from serving import (
     ask,
     at_rest,
     expect,
-    free_port,
     how_it_is_made,
     no_more,
-    painted,
     scales,
     scene,
     searched,
-    serve,
     shows,
     until,
 )
@@ -98,35 +95,6 @@ def test_steps_of_the_player_are_not_gone_back_to(page):
         page.locator("button.step").click()
     searched(page, "network=6")
     assert page.evaluate("history.length") == before
-
-
-# 2: A server that is gone
-
-
-def test_a_server_that_is_gone_is_told_and_its_return_restores_the_view(visit, shipped, tmp_path):
-    port = free_port()
-    store = {"GRANFORCE_DATA": str(shipped)}
-    expected = ("WebSocket", "Failed to load resource", "not connected")
-    with serve(tmp_path, port=port, **store) as (url, server):
-        page = visit(at=url, wanted=expected)
-        ask(page, 1)
-        shows(page, 1)
-        searched(page, "mu=1&")
-        page.locator("button.step").click()
-        searched(page, "network=1")
-        server.kill()
-        page.get_by_role("alert").get_by_text("Connection lost").wait_for()
-        painting = scene(page, "scene.painted")
-        page.locator("button.play").click()  # what is in the page still plays
-        until(page, f"scene.painted > {painting} + 3")
-        page.locator(".scale button").first.click()  # μ = 0, of which nobody hears yet
-    with serve(tmp_path, port=port, **store):
-        page.get_by_text("Connection lost").wait_for(state="detached")
-        painted(page)
-        shows(page, 0)
-        searched(page, "mu=0&")
-        ask(page, 1)  # and it listens again
-        shows(page, 1)
 
 
 # 3: What is refused, and fields

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from serving import expect, free_port, painted, searched, serve
+from serving import ask, expect, free_port, painted, scene, searched, serve, shows, until
 
 import granforce as gf
 
@@ -253,18 +253,38 @@ def test_400_disks_take_the_theme_and_the_friction_along(look):
     assert "dark" not in page.url
 
 
-def test_a_scene_outlives_its_server(opening, shipped, tmp_path):
-    port = free_port()
-    with serve(tmp_path, port=port, GRANFORCE_DATA=str(shipped)) as (url, server):
-        expected = ("WebSocket", "Failed to load resource", "not connected")
-        page = opening("?scene=groove", 1280, 800, at=url, wanted=expected)
-        free(page, 1)
+def test_a_server_that_is_gone_is_told_and_its_return_restores_views(
+    visit, opening, shipped, tmp_path
+):
+    """Meanwhile what is in the pages still plays, and S of a small scene is cut."""
+    port, store = free_port(), {"GRANFORCE_DATA": str(shipped)}
+    expected = ("WebSocket", "Failed to load resource", "not connected")
+    with serve(tmp_path, port=port, **store) as (url, server):
+        small = opening("?scene=groove", 1280, 800, at=url, wanted=expected)
+        page = visit(at=url, wanted=expected)
+        free(small, 1)
+        ask(page, 1)
+        shows(page, 1)
+        searched(page, "mu=1&")
+        page.locator("button.step").click()
+        searched(page, "network=1")
         server.kill()
-        page.get_by_role("alert").get_by_text("Connection lost").wait_for()
-        page.get_by_role("slider", name="friction μ").fill("0.8")  # S is cut all the same
-        page.locator(".bars .value").first.filter(has_text="(possible 0.393 to 3.536)").wait_for()
-        searched(page, "mu=0.8")
-        choose(page, "box")
-    with serve(tmp_path, port=port, GRANFORCE_DATA=str(shipped)):
-        page.get_by_text("Connection lost").wait_for(state="detached")
-        free(page, 2)
+        for one in (page, small):
+            one.get_by_role("alert").get_by_text("Connection lost").wait_for()
+        painting = scene(page, "scene.painted")
+        page.locator("button.play").click()
+        until(page, f"scene.painted > {painting} + 3")
+        page.locator(".scale button").first.click()  # μ = 0, of which nobody hears yet
+        small.get_by_role("slider", name="friction μ").fill("0.8")
+        small.locator(".bars .value").first.filter(has_text="(possible 0.393 to 3.536)").wait_for()
+        searched(small, "mu=0.8")
+        choose(small, "box")
+    with serve(tmp_path, port=port, **store):
+        for one in (page, small):
+            one.get_by_text("Connection lost").wait_for(state="detached")
+        free(small, 2)
+        painted(page)
+        shows(page, 0)
+        searched(page, "mu=0&")
+        ask(page, 1)  # and it listens again
+        shows(page, 1)
