@@ -32,8 +32,8 @@ def test_back_and_forward_restore_views_and_copied_links(visit):
     ask(page, 1)
     shows(page, 1)
     searched(page, "mu=1&")
-    page.get_by_role("tab", name="Friction").click()
-    searched(page, "tab=statistics")
+    page.get_by_role("tab", name="Export").click()
+    searched(page, "tab=export")
     page.go_back()
     no_more(page, "tab=")
     page.locator("[role=tab][aria-selected=true]", has_text="Intervals").wait_for()
@@ -47,7 +47,7 @@ def test_back_and_forward_restore_views_and_copied_links(visit):
     shows(page, 1)
     searched(page, "mu=1&")
     page.go_forward()
-    page.locator("[role=tab][aria-selected=true]", has_text="Friction").wait_for()
+    page.locator("[role=tab][aria-selected=true]", has_text="Export").wait_for()
 
 
 # A page's address by its script alone, and `gone(steps)`: Back or Forward, once it has been heard.
@@ -195,13 +195,13 @@ def test_uploaded_packings_show_their_own_number_of_disks_and_stay(visit, tmp_pa
     expect(how_it_is_made(page).get_by_role("spinbutton", name="Disks N")).to_have_value("40")
     page.get_by_role("spinbutton", name="Seed").wait_for(state="hidden")
     # A look at Learn does not lose the packing and the view.
-    page.get_by_role("tab", name="Friction").click()
-    searched(page, "tab=statistics")
+    page.get_by_role("tab", name="Export").click()
+    searched(page, "tab=export")
     page.get_by_role("link", name="Learn", exact=True).first.click()
     page.get_by_role("heading", name="Which will it be?").first.wait_for()
     page.get_by_role("link", name="Explore", exact=True).click()
     page.locator(".source", has_text="mine.npz").wait_for(state="attached")
-    page.locator("[role=tab][aria-selected=true]", has_text="Friction").wait_for()
+    page.locator("[role=tab][aria-selected=true]", has_text="Export").wait_for()
     searched(page, "packing=")
 
 
