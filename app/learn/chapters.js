@@ -99,7 +99,7 @@ export const CHAPTERS = [
   },
   {
     name: "thirteen", title: "Thirteen disks", heading: "How strong can one contact get?",
-    text: ({ contacts, equations, free, disks, start, mu, mean }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations (counted later): S has ${free} dimensions. No screen can show them, so the plot has two of the forces as axes. The green one starts at ${two(start)}; the mean of all is ${two(mean)}.`,
+    text: ({ contacts, equations, free, disks, start, mu, mean }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations (counted later): S has ${free} dimensions. No screen can show them, so the plot has two of the forces as axes. The green one starts at ${two(start)}; the mean of all is ${two(mean)} (at pressure 1).`,
     ask: "How large can the green force become?",
     doing: () => "Drag the dot to the right as far as it goes, or drag an arrow. All disks stay in balance. Dark: a contact is about to slip (wedge) or to open (ring).",
     see: ({ low, high, free, others }) => [
@@ -174,6 +174,6 @@ export const CHAPTERS = [
       SUMMARY,
     ],
     x: { low: 0, high: 2, label: "push (mean force = 1)" }, y: null,
-    experiment: Push, options: { x: { low: 0, high: 1.5, label: "push" }, y: { low: 0, high: 1.4, label: "force of the line" } },
+    experiment: Push, options: { x: { low: 0, high: 1.8, label: "push" }, y: { low: 0, high: 1.4, label: "force of the line" } },
   },
 ]

@@ -4,6 +4,7 @@
 export function layout(most) {
   return `
     <div class="strip">
+      <a href="?learn">◂ Lesson</a>
       <label>Scene <select class="name" aria-label="Scene"></select></label>
       <label class="mu">friction μ <input class="range" type="range" min="0" max="${most}" step="0.005" aria-label="friction μ">
         <input class="typed" inputmode="decimal" aria-label="μ"></label>
