@@ -36,7 +36,7 @@ const SUMMARY = `<ul>
   <li><b>Its dimension</b>: unknown forces minus equations.</li>
   <li><b>Walk and bounds</b>: a random walk shows what is typical, a linear program what is possible.</li>
   <li><b>Friction</b>: it widens S, but packings made with more of it have fewer contacts, so S has fewer dimensions.</li>
-  <li><b>Limit load and motion</b>: beyond the limit load S is empty; disks move before, where their own forces meet its edge.</li>
+  <li><b>Limit load and motion</b>: beyond the limit load S is empty; disks move before, when their own forces can follow no further along its edge.</li>
 </ul>`
 
 /** The count of free numbers, line by line, with the sum in the last row. */
@@ -168,7 +168,7 @@ export const CHAPTERS = [
       moving ? `Now ${opened} contacts open (rings), ${slid} slip (dots), and disks start to move (black arrows, enlarged). Both disks of the pair move, one of them faster: the gap between them opens.`
         : pushed ? `Without a push, the two disks press on each other with ${two(carried)}. At a push of ${two(high)}, disks start to move.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
-      `The small plot shows how S shrinks as the push grows, to one point at ${two(limit)}, the limit load. The packing gives way earlier, where its own force (line) meets the edge of S; its history chose that force. ${limits.length > 1
+      `The small plot shows how S shrinks as the push grows, to one point at ${two(limit)}, the limit load. The packing gives way earlier: its own forces (line: that of the pair) reach the edge of S and can follow no further. Its history chose them. ${limits.length > 1
         ? "No picture of the disks shows which push moves them. That is why it matters how undetermined forces are."
         : "Would the same disks give way at the same push with other forces?"}`,
       SUMMARY,
