@@ -19,7 +19,7 @@ from granforce.forces.nearest import some_network
 from granforce.quantities import Field, quantity
 from granforce.records import InputError, positive, takes, whole
 from granforce.system import cancelling
-from granforce.tolerances import INTERVAL_GAP, TWINS
+from granforce.tolerances import INTERVAL_GAP, LARGEST_UNIT, TWINS
 from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 
@@ -196,8 +196,10 @@ def informative_grains(
     networks = ensemble.networks(states)
     if networks.ndim != 3 or len(networks) < 2:
         raise InputError(f"states must have shape (n, N_c, 2), n at least 2, got {networks.shape}")
+    if np.abs(networks).max(initial=0.0) > LARGEST_UNIT * ensemble.force_scale:
+        raise InputError(f"forces of states are beyond {LARGEST_UNIT:g} ⟨f_n⟩; check the unit")
     pressures = np.nan_to_num(grain_pressures(ensemble, networks))
-    noise, unit = positive(sigma, "sigma"), ensemble.force_scale
+    noise, unit = positive(sigma, "sigma", most=LARGEST_UNIT), ensemble.force_scale
     pressures, normal = (values - values.mean(axis=0) for values in (pressures, networks[..., 0]))
     spread, variance = normal.std(axis=0), pressures.var(axis=0)
     covariance = pressures.T @ normal / len(normal)

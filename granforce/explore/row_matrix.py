@@ -95,7 +95,9 @@ def with_rows(
     joined = sparse.vstack([A, rows], format="csr")
     square = joined @ C @ joined.T
     give = np.concatenate([diagonal, np.zeros(A.shape[0] - len(diagonal)), 1 / w])
-    square = square + sparse.diags(give + _SHIFT * square.diagonal())
+    give += _SHIFT * square.diagonal()
+    # Where no force of a global row can change, anything keeps it.
+    square = square + sparse.diags(np.where(square.diagonal() + give > 0, give, 1.0))
     solve = cancelling.apart(symmetric_factor, square).solve
     return RowMatrix(walls, C, _blocks(matrix.unweighted), joined, A.shape[0], solve)
 

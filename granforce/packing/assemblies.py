@@ -41,7 +41,7 @@ from granforce.records import (
     refuse_hidden,
 )
 from granforce.system.wording import counted
-from granforce.tolerances import TOUCHING
+from granforce.tolerances import LARGEST_UNIT, TOUCHING
 from granforce.types import Floats, Integers, Mask
 
 # Gaps up to this many tolerances are reported as nearly touching; and, in the largest body, those
@@ -287,6 +287,8 @@ def _legend(names: Sequence[str]) -> str:
 def _outline(body: npt.ArrayLike, name: str) -> Floats:
     """Corners (k, 2), or (3,) x, y, r of a disk."""
     given = real_array(body, name)
+    if np.abs(given).max(initial=0.0) > LARGEST_UNIT:
+        raise InputError(f"{name} extends beyond {LARGEST_UNIT:g}; give lengths in another unit")
     if given.ndim != 1:
         return polygons.polygon(given, name)
     disk = float_array(given, (3,), name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -126,7 +127,9 @@ def from_disks(
 
 def _bodies(clumps: npt.ArrayLike, count: int) -> Integers:
     """The number of the body (N,) of each disk, in the order of the labels."""
-    labels = np.asarray(clumps)
+    labels = np.zeros(0)
+    with suppress(ValueError):  # rows of different lengths
+        labels = np.asarray(clumps)
     if labels.shape != (count,) or labels.dtype.kind not in "iuU":
         raise InputError(
             f"clumps must be {count} labels, whole numbers or texts, one for each disk"

@@ -21,7 +21,7 @@ from granforce.records import (
     repeated,
 )
 from granforce.system.wording import counted
-from granforce.tolerances import LISTED_TOUCHING, RIGID_OVERLAP, UNUSUAL_GAP
+from granforce.tolerances import LARGEST_UNIT, LISTED_TOUCHING, RIGID_OVERLAP, UNUSUAL_GAP
 from granforce.types import Floats, Integers, Mask
 
 # Contacts may overlap, or have a gap, up to this fraction of the smaller radius.
@@ -224,7 +224,7 @@ def check_disks(
             f"{place(g)}: radius {r[g]:g} is not positive; correct or remove the grain"
         )
     largest = r.max()
-    if largest < 1e-100:
+    if largest < 1e-100 or largest > LARGEST_UNIT:
         raise InputError(f"the largest radius is {largest:g}; give lengths in another unit")
     for g in np.flatnonzero(r < largest / EXTENT)[:1]:
         raise InputError(
