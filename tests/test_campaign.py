@@ -33,9 +33,29 @@ def test_small_packings_stand(block):
     assert not wrong and not undecided and done > 40  # packings of too few disks are refused
 
 
-@pytest.mark.parametrize("number", [100, 118, 276])
+@pytest.mark.parametrize("make", [campaign.floor, campaign.parts])
+def test_floors_and_bodies_of_parts_stand(make):
+    wrong, undecided, done = judged(range(6), make=make, every=4)
+    assert not wrong and not undecided and done > 60
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("make", [campaign.floor, campaign.parts])
+def test_many_floors_and_bodies_of_parts_stand(make):
+    wrong, undecided, done = judged(range(100, 130), make=make)
+    assert not wrong, "\n".join(wrong)
+    assert len(undecided) <= UNDECIDED * done, "\n".join(undecided)
+
+
+@pytest.mark.parametrize("number", [7, 8, 13, 21])
+def test_tables_of_total_forces_give_the_packing_back(number):
+    campaign.total_forces(campaign.case(number, most=40))
+
+
+@pytest.mark.parametrize("number", [3, 100, 118, 276])
 def test_what_fell_stands(number):
-    """Unbalanced states; a bounded S called unbounded; a ranking ended by one open bound."""
+    """Pressures where S is a point; unbalanced states; a bounded S called unbounded; a ranking
+    ended by one open bound."""
     wrong, undecided, _ = judged([number])
     assert not wrong and not undecided
 

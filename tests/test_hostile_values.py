@@ -1,9 +1,11 @@
 """Hostile values end in a result or in one line; results know what they are of."""
 
+import io
 import warnings
 
 import hostile
 import numpy as np
+import pandas as pd
 import pytest
 from packings import packed
 
@@ -35,6 +37,30 @@ def test_some_hostile_values(calls):
 def test_all_hostile_values(calls):
     assert len(calls) >= 3000
     assert judged(calls) == {}
+
+
+@pytest.mark.parametrize("column", ["i", "j", "fx", "fy"])
+def test_hostile_words_in_tables_of_total_forces(column):
+    packing = packed(20, 0.3)
+    c = packing.contacts
+    fx, fy = (packing.forces[:, :1] * c.normal + packing.forces[:, 1:] * c.tangent).T
+    grains = pd.DataFrame({"x": packing.x[:, 0], "y": packing.x[:, 1], "r": packing.r})
+    links = pd.DataFrame({"i": c.i, "j": c.j, "fx": fx, "fy": fy}).astype(object)
+    options = {"box": packing.box, "mu": 0.3}
+
+    def read(table):
+        files = [io.StringIO(one.to_csv(index=False)) for one in (grains, table)]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", gf.InputWarning)  # of forces that do not balance
+            return gf.read_table(*files, **options)
+
+    wrong, bad = [words for words in hostile.VALUES.values() if np.isscalar(words)], {}
+    for words in [*wrong, "1e", "0x1", "-", "1 2", "١"]:
+        table = links.copy()
+        table.loc[3, column] = words
+        if told := hostile.fault(read, {"table": table}):
+            bad[str(words)] = told
+    assert hostile.fault(read, {"table": links}) is None and bad == {}
 
 
 @pytest.fixture(scope="module")

@@ -6,13 +6,16 @@ Judges are `residual` and `violation`, scipy's linear programs for bounds, and t
 nothing may be called empty, or undecided, where a network of it is at hand.
 """
 
+import io
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from packings import two_disks
 from scipy.optimize import linprog
 
 import granforce as gf
+from granforce.packing.masonry import rectangle
 from granforce.records import Packing, make_packing
 from granforce.tolerances import ADMISSIBLE, BALANCED, INTERVAL_GAP
 
@@ -62,14 +65,55 @@ def _in_units(packing, length):
     )
 
 
+def floor(number, most=25):
+    """The Case of disks at rest on a floor, rough or smooth."""
+    rng = np.random.default_rng([26, number])
+    low, high = sorted(10 ** rng.uniform(-0.3, 0.3, 2) * 10 ** rng.uniform(-6, 6))
+    n, mu, seed = int(rng.integers(3, most)), 10 ** rng.uniform(-2, 1), int(rng.integers(2**31))
+    box = ("floor", "smooth floor")[number % 2]
+    return Case(number, gf.pack(n, mu, seed, radii=f"uniform:{low:.9g},{high:.9g}", box=box), rng)
+
+
+def parts(number, most=12):
+    """The Case of a wall of stones in two parts each: rectangles, or L that interlock."""
+    rng = np.random.default_rng([27, number])
+    rows, columns = int(rng.integers(1, 4)), int(rng.integers(1, 1 + most // 6))
+    unit, cut = 10 ** rng.uniform(-6, 6), rng.uniform(0.5, 1.5)
+    stones = []
+    for row, column in np.ndindex(rows, columns):
+        x, y = 2 * column, 3 * row
+        if number % 2:
+            stones.append([rectangle(x, y, x + 1, y + 2), rectangle(x + 1, y, x + 2, y + 1)])
+            x2, y2, y3 = x + 2, y + 2, y + 3
+            stones.append([rectangle(x, y2, x + 1, y3), rectangle(x + 1, y + 1, x2, y3)])
+        else:
+            x += 0.7 * (row % 2)
+            halves = rectangle(x, y, x + cut, y + 3), rectangle(x + cut, y, x + 2, y + 3)
+            stones.append(list(halves))
+    bodies = [*stones, [rectangle(-2, -1, 2 * columns + 2, 0)]]
+    bodies = [[unit * np.array(part) for part in body] for body in bodies]
+    mu, weights = (
+        10 ** rng.uniform(-1, 0),
+        10 ** rng.uniform(-6, 6) * rng.uniform(0.5, 2, len(bodies)),
+    )
+    packing = gf.blocks(bodies, mu, fixed=[len(stones)], weights=weights)
+    return Case(number, packing, rng)
+
+
 def spaces(one):
-    """Force spaces of a case, {name: (its ensemble, a network (contacts, 2) that lies in it)}."""
+    """Force spaces of a case, {name: (its ensemble, a network (contacts, 2) that lies in it)}.
+
+    Of packings without a pressure those alone that are bounded.
+    """
     packing, rng = one.packing, one.rng
     S = gf.ensemble(packing)
+    if not S.has_pressure_row and not S.bounded:
+        return {}
     member = S.expand(gf.walk(S, 1, 0).states[0] if one.number % 2 else _own(S))
     found = {"own": (S, member)}
     wider = min(1e4, max(1e-6, packing.mu) * 10 ** rng.uniform(0, 2))
-    asked = {"opened": {"mu": wider}, "stress": {"prescribed": "stress"}}
+    asked = {"opened": {"mu": wider}}
+    asked |= {"stress": {"prescribed": "stress"}} if S.has_pressure_row else {}
     frozen = rng.permutation(len(packing.contacts.i))[: len(packing.contacts.i) // 2]
     asked["frozen"] = {"frozen": frozen}
     own = packing.forces if S.admits(S.original) else None
@@ -81,7 +125,7 @@ def spaces(one):
     width = np.where(rng.random((len(held), 2)) < 0.3, 0.0, 0.1) * np.abs(state[held])
     known = gf.Known(held, state[held] - width, state[held] + width)
     found["known"] = gf.ensemble(packing, known=known), state
-    return found
+    return {name: one for name, one in found.items() if S.has_pressure_row or one[0].bounded}
 
 
 def _own(S):
@@ -96,8 +140,8 @@ def walks(S, rng):
 
 def sweeps(S, rng):
     """Sweeps claim no more than they reach."""
-    if S.prescribed == "stress" or S.known is not None:
-        return  # contact dynamics knows neither
+    if S.prescribed == "stress" or S.known is not None or S.packing.shapes is not None:
+        return  # contact dynamics knows none of these
     found = gf.gauss_seidel(S, S.original)
     if found.converged and found.residual <= 1e-6:
         assert S.violation(found.forces) <= ADMISSIBLE
@@ -180,6 +224,35 @@ def inferences(S, rng):
     _balanced_or_told(S, found.draws.flat, found.draws.reached)
 
 
+def pressures(S, rng):
+    """Measured pressures of grains fit no worse than the network from which they were made."""
+    own = _member(S)
+    if own is None:
+        return
+    true = gf.grain_pressures(S, own)
+    grains = np.flatnonzero(np.isfinite(true))
+    sigma = 0.1 * np.abs(true[grains]).mean()
+    noise = rng.normal(size=len(grains))
+    given = gf.GrainPressures(grains, true[grains] + sigma * noise, sigma)
+    found = gf.infer(S, pressures=given, states=8, unmeasured=1e3)
+    _balanced(S, found.forces)
+    _balanced_or_told(S, found.draws.flat, found.draws.reached)
+    usual = np.sum((own / (1e3 * S.force_scale)) ** 2)
+    assert found.chi_square <= noise @ noise + usual + 1e-6, f"χ² {found.chi_square}"
+
+
+def total_forces(one):
+    """A packing is read again from tables of its grains and total forces."""
+    packing, c = one.packing, one.packing.contacts
+    fx, fy = (packing.forces[:, :1] * c.normal + packing.forces[:, 1:] * c.tangent).T
+    grains = pd.DataFrame({"x": packing.x[:, 0], "y": packing.x[:, 1], "r": packing.r})
+    links = pd.DataFrame({"i": c.i, "j": c.j, "fx": fx, "fy": fy})
+    files = [io.StringIO(table.to_csv(index=False)) for table in (grains, links)]
+    again = gf.read_table(*files, box=packing.box, mu=packing.mu)
+    off = np.abs(again.forces - packing.forces).max(initial=0.0)
+    assert off <= 1e-6 * np.abs(packing.forces).max(initial=0.0), f"off by {off:.1e}"
+
+
 def carries(S, rng):
     own = _member(S)
     if own is not None:
@@ -209,17 +282,17 @@ UNDECIDED = "UndecidedError", "uncertified", "not certified", "cannot be certifi
 
 STAGES = (
     *(walks, sweeps, nearests, uniform_states, hit_and_run, bounds, limit_loads, reaches, pulls),
-    *(outlines, stress_outlines, inferences, carries, next_measurements, pushes),
+    *(outlines, stress_outlines, inferences, pressures, carries, next_measurements, pushes),
 )
 
 
-def faults(number, most=60, every=1):
+def faults(number, make=case, every=1, **options):
     """What did not stand in a case, [(space, stage, what)], and how many stages were gone through.
 
     A refusal is a fault, as every space has a network that is at hand. every: of each space only
     one stage in so many is gone through, by turns.
     """
-    one, wrong, done = case(number, most), [], 0
+    one, wrong, done = make(number, **options), [], 0
     if one is None:
         return wrong, done
     try:

@@ -81,7 +81,23 @@ def functions():
     contacts = packing.contacts
     forces = S.original
     ensembled = {"ensemble": S}
+    pair, third = [[0, 0.5, 0.5], [1.0, 0.5, 0.5]], [[0, 1], [1, 1], [1, 2], [0, 2]]
+    ground = [[-2, -1], [3, -1], [3, 0], [-2, 0]]
     return {
+        "blocks of parts": (lambda **given: gf.blocks([pair, third, ground], **given), {
+            "mu": 0.5, "fixed": [2], "weights": [2.0, 1.0, 1.0], "tolerance": 1e-6}),
+        "parts": (lambda disk, corners: gf.blocks([[disk, corners], ground], 0.5, fixed=[1]), {
+            "disk": pair[0], "corners": [[1, 0], [2, 0], [2, 1], [1, 1]]}),
+        "from_disks on a floor": (gf.from_disks, {
+            "x": [[0, 1], [2, 1]], "r": [1.0, 1.0], "mu": 0.5, "walls": "floor", "gravity": 1.0,
+            "clumps": [0, 0], "tolerance": 1e-6}),
+        "pack on a floor": (gf.pack, {"n": 5, "mu": 0.3, "seed": 1, "radii": "uniform:0.5,1",
+                                      "box": "floor"}),
+        "grain_pressures": (gf.grain_pressures, ensembled | {"forces": forces}),
+        "pressures": (lambda **given: gf.infer(S, pressures=gf.GrainPressures(*given.values())), {
+            "grains": [0, 1], "values": [1.0, 0.9], "errors": [0.1, 0.2]}),
+        "informative_grains": (lambda states, k, by: gf.informative_grains(S, states, by, k), {
+            "states": walk.states, "k": 2, "by": 0.1}),
         "pack": (gf.pack, {"n": 8, "mu": 0.3, "seed": 1, "radii": "uniform:0.5,1", "pressure": 1.0,
                            "dt": 0.05, "box_mass": 100.0, "sweeps": 100, "accuracy": 0.01,
                            "drag_below": 0.02, "box": "square", "max_steps": 3000}),
