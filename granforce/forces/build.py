@@ -7,6 +7,7 @@ other contacts; both are counted.
 from __future__ import annotations
 
 import copy
+import inspect
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -73,6 +74,37 @@ def ensemble(
     """
     given = {"mu": mu, "prescribed": prescribed, "stress": stress, "known": known}
     given |= {"frozen": frozen, "prune": prune}
+    S, conditions = _unproved(packing, mu, prescribed, stress, known, frozen, prune)
+    if prune:
+        S = _pruned(S, conditions)
+        _check_idle_and_known(S, conditions.bounds)
+    object.__setattr__(S, "conditions", copy.deepcopy(given))  # arrays may be changed
+    return S
+
+
+@takes(Packing)
+def unproved(packing: Packing, **conditions: Any) -> Ensemble:
+    """What `ensemble` returns if all contacts carry but those of grains without another.
+
+    A network in which they all press proves that they do.
+    """
+    defaults = {
+        name: parameter.default
+        for name, parameter in inspect.signature(ensemble).parameters.items()
+        if parameter.default is not parameter.empty
+    }
+    return _unproved(packing, **defaults | conditions)[0]
+
+
+def _unproved(
+    packing: Packing,
+    mu: npt.ArrayLike | None,
+    prescribed: str,
+    stress: npt.ArrayLike | None,
+    known: Known | None,
+    frozen: npt.ArrayLike | None,
+    prune: bool,
+) -> tuple[Ensemble, _Conditions]:
     count = len(packing.contacts.i)
     contacts, mu = with_friction(packing.contacts, packing.mu if mu is None else mu)
     packing = packing._replace(contacts=contacts)
@@ -96,11 +128,7 @@ def ensemble(
         free = backbone.without_danglers(packing, free, held)
     S = _assemble(packing, conditions, free)
     _check_frozen_and_known(packing, held, bounds, S.force_scale)
-    if prune:
-        S = _pruned(S, conditions)
-        _check_idle_and_known(S, bounds)
-    object.__setattr__(S, "conditions", copy.deepcopy(given))  # arrays may be changed
-    return S
+    return S, conditions
 
 
 def with_idle(S: Ensemble) -> Ensemble:

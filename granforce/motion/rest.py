@@ -15,17 +15,18 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from granforce.fields import record
-from granforce.forces.build import ensemble_at
+from granforce.forces.build import ensemble_at, unproved
 from granforce.forces.contact_problem import wedged
 from granforce.forces.ensemble import Ensemble
 from granforce.motion import flow
-from granforce.motion.flow import Push
+from granforce.motion.flow import Outcome, Push
 from granforce.motion.flow_lanes import relax
 from granforce.motion.inertia import make_step
+from granforce.motion.step import Step
 from granforce.quantities import ALL_CONTACTS, FORCE, Field
 from granforce.records import InputError, Packing, float_array, random_seed, whole
 from granforce.system import cancelling
-from granforce.tolerances import NO_EQUILIBRIUM
+from granforce.tolerances import NO_EQUILIBRIUM, SEEN_CARRYING
 from granforce.types import Cancel, Floats, Integers, Mask
 
 # Standard deviations of the noise on each force (in ⟨f_n⟩), and number of draws for each.
@@ -100,15 +101,12 @@ def rest(
     InputError
         If the packing has no forces, and for conditions with an Ensemble.
     """
-    S = ensemble_at(packing, **conditions)
     draws = whole(draws, "draws", least=1)
     noise = tuple(float(level) for level in float_array(noise, (-1,), "noise"))
     if min(noise, default=0.0) < 0:
         raise InputError("noise must be standard deviations ≥ 0")
-    if not S.original.any():
-        raise InputError("the packing has no forces to check for rest")
-    step, forces = make_step(S), S.original / S.force_scale
-    first = relax(step, _from(forces))
+    S, step, first = _from_its_own(packing, conditions)
+    forces = S.original / S.force_scale
     if not first.at_rest:
         none = np.zeros((len(noise), draws), dtype=bool)
         why = "grains move under its own forces"
@@ -129,6 +127,30 @@ def rest(
     return Rest(
         not reasons, distance, noise, stayed, _on_all(S, moving), "; ".join(reasons), wedged(S)
     )
+
+
+def _from_its_own(
+    packing: Packing | Ensemble, conditions: dict[str, Any]
+) -> tuple[Ensemble, Step, Outcome]:
+    """The ensemble, its step problem and the flow from its own forces.
+
+    Which contacts carry is left to the flow to prove: if it ends at rest with all of them pressing,
+    they do. Otherwise the ensemble proves it.
+    """
+    if not isinstance(packing, Ensemble):
+        S = unproved(packing, **conditions)
+        step, first = _flow(S)
+        if first.at_rest and first.forces[:, 0].min() > SEEN_CARRYING:
+            return S, step, first
+    S = ensemble_at(packing, **conditions)
+    return S, *_flow(S)
+
+
+def _flow(S: Ensemble) -> tuple[Step, Outcome]:
+    if not S.original.any():
+        raise InputError("the packing has no forces to check for rest")
+    step = make_step(S)
+    return step, relax(step, _from(S.original / S.force_scale))
 
 
 def _elsewhere(S: Ensemble, distance: float) -> str:

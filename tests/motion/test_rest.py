@@ -5,6 +5,7 @@ import pytest
 from packings import packed
 
 import granforce as gf
+from granforce.forces import backbone
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3, 3.0])
@@ -39,3 +40,15 @@ def test_violations_of_coulombs_law_alone_are_not_at_rest():
     assert S.residual(S.original) < 1e-9 < 0.05 < S.violation(S.original)
     outcome = gf.rest(S)
     assert not outcome.at_rest and "violation of Coulomb's law" in outcome.reason
+
+
+@pytest.mark.parametrize("n, seed, proofs", [(30, 1, 0), (20, 22, 1)])
+def test_the_ensemble_need_not_prove_what_the_flow_does(monkeypatch, n, seed, proofs):
+    """The other packing has two contacts, between grains of several, that carry nothing."""
+    packing, tried, carrying = packed(n, 0.3, seed), [], backbone.carrying
+    proved = gf.rest(gf.ensemble(packing))
+    monkeypatch.setattr(backbone, "carrying", lambda S: tried.append(S) or carrying(S))
+    found = gf.rest(packing)
+    assert len(tried) == proofs and found.at_rest
+    for one, other in zip(found, proved, strict=True):
+        np.testing.assert_array_equal(one, other)
