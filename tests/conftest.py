@@ -18,7 +18,10 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 # What makes and pushes packings, and all else: each takes half of the time to compile.
 KERNELS = (
     "warm_up({kinds.PERTURBATION})",
-    "warm_up(set(kinds.KINDS.values()) - {kinds.PERTURBATION}, reference('n100_mu0.1_s11'))",
+    "import granforce as gf\n"
+    "warm_up(set(kinds.KINDS.values()) - {kinds.PERTURBATION}, reference('n100_mu0.1_s11'))\n"
+    "round = gf.pack(12, 0.3, box='isotropic')\n"
+    "gf.walk(gf.ensemble(round), 2, relax='gauss_seidel_only')",
 )
 
 
