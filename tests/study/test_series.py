@@ -63,18 +63,6 @@ def refused(tmp_path_factory):
     return folder, *series.infer_series(folder / "store", frames, workers=2, **OPTIONS)
 
 
-def test_dask_workers_give_the_same_as_processes(tmp_path, refused, cluster):
-    """The second frame is refused, by a worker in the same words as here."""
-    folder, dataset, failed = refused
-    two, missed = series.infer_series(
-        *(tmp_path / "two", frames_of(folder)),
-        scheduler=cluster.scheduler_address,
-        **OPTIONS,
-    )
-    assert xr.testing.assert_identical(dataset, two) is None and two.sizes["frame"] == 2
-    assert failed == missed and len(failed) == 1
-
-
 def test_a_frame_that_is_refused_costs_only_itself(refused):
     folder, dataset, ((frame, message),) = refused
     assert dataset["frame"].values.tolist() == [1, 3]
