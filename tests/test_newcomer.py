@@ -677,19 +677,6 @@ def test_help_explains_the_fields_of_records_with_their_units():
     assert "backbone, as positions in packing.x" in pydoc.render_doc(gf.Ensemble)
 
 
-def test_pictures_look_the_same_whichever_backend_was_loaded_first():
-    code = (
-        "import granforce as gf, holoviews as hv\n"
-        "packing = gf.scene('groove', 0.5)\n"
-        "gf.plot(packing)\n"
-        "drawn = hv.render(gf.plot(packing, backend='matplotlib'), backend='matplotlib')\n"
-        "disks = drawn.axes[0].collections[0]\n"
-        "print(disks.get_facecolor()[0, 0] > 0.9, disks.get_edgecolor()[0, 0] < 0.7)"
-    )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert run.stdout == "True True\n", run.stderr
-
-
 @pytest.mark.parametrize("command", ["walk", "uniform"])
 def test_states_are_written_in_the_format_of_the_suffix(command, cache, capsys):
     gf.save_packing(packed(30, 0.3), "p.npz")

@@ -56,7 +56,7 @@ def test_the_benchmark_has_a_frame_for_each_part_with_enough_points():
     np.testing.assert_allclose(second["exact"], ([4], [1.0]))
 
 
-def test_pages_need_no_network(tmp_path):
+def test_pages_need_no_network_and_pictures_made_after_them_look_the_same(tmp_path):
     # In a process of its own, as the command line's: Panel, where loaded, adds links to its styles.
     path = tmp_path / "figure.html"
     code = (
@@ -64,8 +64,13 @@ def test_pages_need_no_network(tmp_path):
         "ours = {'mu': 0.1, 'solver': 'ours'}\n"
         "rows = [{'n': n, **ours, 'seconds': n / 100} for n in (100, 200, 400)]\n"
         f"figures.save(figures.benchmark({{'scaling': rows}}), {str(path)!r})\n"
+        "import granforce as gf, holoviews as hv\n"
+        "groove = gf.plot(gf.scene('groove', 0.5), backend='matplotlib')\n"
+        "disks = hv.render(groove, backend='matplotlib').axes[0].collections[0]\n"
+        "print(disks.get_facecolor()[0, 0] > 0.9, disks.get_edgecolor()[0, 0] < 0.7)"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert run.stdout == "True True\n", run.stderr
     # Scripts and styles are in the page: it needs no network.
     assert not re.search(r"<script[^>]+src=|<link[^>]+stylesheet", path.read_text())
 
