@@ -107,7 +107,11 @@ class Tabs:
 
     def _showing(self) -> Iterator[None]:
         name = self.names[self.tabs.active]
-        yield from self.fill(name)  # first, so that observers of the state find it
+        yield from self.fill(name)
+        self._tell(name)
+
+    def _tell(self, name: str) -> None:
+        """The tab on screen, whose view exists: it has its sentences from here on."""
         if name == self.names[self.tabs.active]:
             self.looks.tab = name
 
@@ -117,16 +121,17 @@ class Tabs:
             self._begun.add(name)
             yield
             view = VIEWS[name](self.state)
+            self._tell(name)
             yield
             pieces = list(view.panel())
             if name == "plane":
                 pieces.insert(0, pn.pane.HTML(SPACE, stylesheets=[HEADING], margin=0))
             if name in PLOTTED and not (name == "plane" and self.looks.wide):  # there once
                 pieces.append(figure.panel(self.state, TABS[name].lower().replace(" ", "_")))
-            # Choices first, then two at a time: Bokeh processes everything at each step.
+            # Two at a time, first choices and a sentence: Bokeh processes everything at each step.
             queued = []
-            for k in range(-1, len(pieces), 2):
-                queued += pieces[max(k, 0) : k + 2]
+            for k in range(0, len(pieces), 2):
+                queued += pieces[k : k + 2]
                 self.pages[name][:] = queued
                 yield
             self.looks.views += 1

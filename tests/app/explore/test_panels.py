@@ -17,7 +17,9 @@ from bokeh.document import Document
 from bokeh.io.doc import patch_curdoc
 from bokeh.models import CustomJS
 from packings import REFERENCE, packed, skewed
-from panel.pane import Bokeh
+from panel import Column
+from panel.pane import HTML, Bokeh
+from param.parameterized import discard_events
 from small_store import DISKS, KEPT, ROOT, STATES
 from visitor import drop, press, wait_for
 
@@ -39,6 +41,7 @@ from app.explore.tabs.intervals import intervals as intervals_view
 from app.explore.tabs.intervals.growth_figure import GrowthFigure
 from app.explore.tabs.push import push as perturb_view
 from app.explore.tabs.push.over_packings import responses
+from app.explore.tabs.tabs import Tabs
 from app.explore.tabs.your_packing import samples
 from app.explore.tabs.your_packing import upload as upload_view
 from app.packing.player import Player, frames
@@ -795,6 +798,15 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
         pushed.opened,
         pushed.slid,
     )
+
+
+@pytest.mark.parametrize("name", ["intervals", "perturb", "export"])
+def test_a_tab_that_opens_has_a_sentence_at_every_step(state, name):
+    tabs = Tabs(state, Column())
+    with discard_events(tabs.tabs):
+        tabs.tabs.active = tabs.names.index(name)
+    for _ in tabs._showing():
+        assert any(one.object for one in tabs.pages[name] if isinstance(one, HTML))
 
 
 def test_a_push_is_never_without_a_sentence_and_says_what_it_waits_for(state, library):
