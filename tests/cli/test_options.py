@@ -77,14 +77,14 @@ LINES = {
     "completion": ["bash"],
     "import lammps": [
         "particles.dump contacts.dump --mu 0.5",
-        "particles.dump contacts.dump --mu 0.5 --frames all",
-        "particles.dump contacts.dump --mu 0.5 --frames all --states 2",
+        "particles.dump contacts.dump --mu 0.5 --frames all --workers 1",
+        "particles.dump contacts.dump --mu 0.5 --frames all --states 2 --workers 1",
     ],
     "import yade": ["bodies.txt interactions.txt --mu 0.5"],
     "import mercury": [
         "run.data run.fstat --mu 0.5",
-        "run.data run.fstat --mu 0.5 --frames 0",
-        "run.data run.fstat --mu 0.5 --frames 0 --states 2",
+        "run.data run.fstat --mu 0.5 --frames 0 --workers 1",
+        "run.data run.fstat --mu 0.5 --frames 0 --states 2 --workers 1",
     ],
     "import table": ["grains.csv --mu 0.3", "grains.csv contacts.csv --mu 0.3"],
     "import blocks": ["bodies.csv --mu 0.5"],
