@@ -247,7 +247,7 @@ def _step(motion, mu, pressure, pace, counters, stop):
     stride = _fastest(problem, force, velocity) * dt
     growth = min(GROWTH, max(1.0 / GROWTH, pace.stride / max(stride, 1e-300)))
     motion.pace[0] = min(pace.longest, max(pace.shortest, dt * growth))
-    return overlap / motion.r.max(), _unbalance(motion, before, force, dt)
+    return overlap / _largest(motion.r), _unbalance(motion, before, force, dt)
 
 
 @allocating_part
@@ -354,10 +354,11 @@ def _near_contacts(motion, dt, box_inertia):
     for k in range(x.shape[0]):
         speed = max(speed, motion.velocity[k, 0] ** 2 + motion.velocity[k, 1] ** 2)
     # Twice the fastest free approach, and the distance that forces may push grains in this step.
-    margin = 2.0 * dt * (2.0 * np.sqrt(speed) + 2.0 * fastest(rate_in(motion.dilation)) * r.max())
-    margin = min(margin + (2e-3 + 4.0 * dt * dt) * r.max(), REACH * r.max())
+    largest = _largest(r)
+    margin = 2.0 * dt * (2.0 * np.sqrt(speed) + 2.0 * fastest(rate_in(motion.dilation)) * largest)
+    margin = min(margin + (2e-3 + 4.0 * dt * dt) * largest, REACH * largest)
     pairs = motion.i.shape[0]
-    active = np.empty(pairs, np.int64)
+    active, ends = np.empty(pairs, np.int64), np.empty((2, pairs), np.int64)
     table = np.empty((6, pairs))
     count = 0
     overlap = 0.0
@@ -375,7 +376,7 @@ def _near_contacts(motion, dt, box_inertia):
         if motion.force[p, 0] > 0.0:
             overlap += max(-gap, 0.0)
             touching += 1
-        active[count] = p
+        active[count], ends[0, count], ends[1, count] = p, i, j
         table[0, count] = d_x / length
         table[1, count] = d_y / length
         table[2, count] = length
@@ -386,8 +387,8 @@ def _near_contacts(motion, dt, box_inertia):
     active = active[:count]
     inertia = 0.5 * motion.mass * r**2
     problem = StepProblem(
-        motion.i[active],
-        motion.j[active],
+        ends[0, :count],
+        ends[1, :count],
         table[0, :count],
         table[1, :count],
         table[2, :count],
@@ -404,6 +405,14 @@ def _near_contacts(motion, dt, box_inertia):
 
 
 @within
+def _largest(values):
+    largest = values[0]
+    for k in range(values.shape[0]):
+        largest = max(largest, values[k])
+    return largest
+
+
+@within
 def _move(motion, dilation, dt):
     quickest = 0.0
     for k in range(motion.x.shape[0]):
@@ -415,7 +424,7 @@ def _move(motion, dilation, dt):
     motion.box[0], _ = carried(dilation, motion.box[0], 0.0, dt)
     motion.tilt[0], motion.box[1] = carried(dilation, motion.tilt[0], motion.box[1], dt)
     # Two grains at a distance of twice the largest radius approach by at most this much.
-    approach = fastest(dilation) * dt * 3.0 * motion.r.max()
+    approach = fastest(dilation) * dt * 3.0 * _largest(motion.r)
     motion.drift[0] += 2.0 * np.sqrt(quickest) * dt + approach
 
 
