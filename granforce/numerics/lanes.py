@@ -164,11 +164,12 @@ def _plain_store(array, index, lanes, value):
 
 
 def _plain_three(array, index, step, lanes):
-    return array.reshape(-1, len(lanes))[[index, index + step, index + 2 * step]]
+    return np.array([_plain_load(array, index + k * step, lanes) for k in range(3)])
 
 
 def _plain_keep_three(array, index, lanes, values):
-    array.reshape(-1, len(lanes))[index : index + 3] = values
+    for k in range(3):
+        _plain_store(array, index + k, lanes, values[k])
 
 
 def _plain_less(values, a, b):
