@@ -819,15 +819,14 @@ def repeated(contacts: Contacts) -> tuple[int, int] | None:
     its first repetition. Bodies with edges may touch twice with one normal, at different places.
     """
     low, high = np.minimum(contacts.i, contacts.j), np.maximum(contacts.i, contacts.j)
-    normal = np.where((contacts.i > contacts.j)[:, None], -contacts.normal, contacts.normal)
-    place = np.where(
-        (contacts.i > contacts.j)[:, None],
-        np.column_stack([contacts.arm_j, -contacts.offsets[:, 1]]),
-        np.column_stack([contacts.arm_i, contacts.offsets[:, 0]]),
-    )
+    turned, (own, other) = contacts.i > contacts.j, contacts.offsets.T
+    normal = np.where(turned[:, None], -contacts.normal, contacts.normal)
+    arm, lever = np.where(turned, -contacts.arm_j, contacts.arm_i), np.where(turned, other, own)
+    # From the first body; disks are round, and images of a pair have one arm.
+    place = arm[:, None] * contacts.normal + lever[:, None] * contacts.tangent
     reach = np.abs(contacts.arm_i) + np.abs(contacts.arm_j)
     if contacts.levers is None:
-        place[:, 0] = 0.0  # disks are round, and images of a pair have one arm
+        place[:] = 0.0
     order = np.lexsort((high, low))
     pairs: list[tuple[int, int]] = []
     for apart in range(1, min(len(order), 9)):
