@@ -8,7 +8,8 @@ weight downwards.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from decimal import ROUND_CEILING, Decimal
 from typing import Any, NamedTuple
 
@@ -25,6 +26,7 @@ from granforce.packing.polygons import Meeting, Touch
 from granforce.records import (
     Contacts,
     InputError,
+    InputWarning,
     NotJammedError,
     Packing,
     Shapes,
@@ -81,7 +83,7 @@ def blocks(
     bodies : sequence of array, or of lists of arrays
         Corners (k, 2) of a convex polygon, in either direction, or (x, y, r) of a disk, for each;
         or a list of such parts, which move as one, whether they touch or not. Where parts overlap,
-        their areas add up. A fixed body may be a thin wall, (2, 2).
+        their areas add up, and an InputWarning says so. A fixed body may be a thin wall, (2, 2).
     mu : float or (N_c,) array
         Friction coefficient, or those of all contacts.
     fixed : array of int, default ()
@@ -156,6 +158,8 @@ def blocks(
     load[held] = np.nan
     polygonal = [one if one.ndim == 2 else np.empty((0, 2)) for one in parts.outlines]
     several = len(polygonal) > len(x)
+    if len(twice := _overlapping(parts, held, tolerance)):
+        warnings.warn(counted_twice(names[k] for k in twice), InputWarning, stacklevel=2)
     packing = make_packing(
         x,
         r,
@@ -274,6 +278,24 @@ def _up(gap: float) -> str:
 def larger_tolerance(pairs: str) -> str:
     """Words on pairs that nearly touch, with what makes them contacts."""
     return f"{pairs}: a larger --tolerance (tolerance=) makes them contacts"
+
+
+def counted_twice(bodies: Iterable[Any]) -> str:
+    """Words on bodies with parts that overlap."""
+    return (
+        f"parts of bodies {brief_list(list(bodies))} overlap: their common area counts twice, so "
+        "that mass and centre of mass are wrong; give parts that do not overlap"
+    )
+
+
+def _overlapping(parts: _Parts, held: Mask, tolerance: float) -> Integers:
+    """Bodies with parts that overlap, and that can move."""
+    x, r, body = parts.circles[:, :2], parts.circles[:, 2], parts.body
+    i, j, _ = find_pairs(x, r, make_cell([np.inf, np.inf]), 0.0)
+    within = (body[i] == body[j]) & ~held[body[i]]
+    pairs = zip(i[within], j[within], strict=True)
+    deep = [_meeting(parts.outlines[a], parts.outlines[b], tolerance).gap for a, b in pairs]
+    return np.unique(body[i[within][np.array(deep, dtype=float) < -tolerance]])
 
 
 def _legend(names: Sequence[str]) -> str:

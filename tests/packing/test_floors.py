@@ -170,6 +170,18 @@ def test_clumps_are_the_bodies_that_blocks_make():
     assert np.abs(across.contacts.normal[across.contacts.j == 1, 0]) == pytest.approx([0.9, 0.9])
 
 
+def test_clumps_are_read_from_a_column_of_labels():
+    x, r = [(0, 1), (1.2, 1), (0.6, 1 + np.sqrt(4 - 0.6**2))], np.ones(3)
+    options = {"mu": 0.5, "walls": "floor", "gravity": 1}
+    rows = "".join(f"{a},{b},1,{label}\n" for (a, b), label in zip(x, "ccb", strict=True))
+    with pytest.warns(gf.InputWarning, match="parts of bodies 1 overlap") as told:
+        read = gf.read_table(io.StringIO("x,y,r,body\n" + rows), **options)
+        made = gf.from_disks(x, r, clumps=list("ccb"), **options)
+    assert read == made and len(told) == 2
+    with pytest.raises(gf.InputError, match="leave out contacts, forces, loads"):
+        gf.read_table(io.StringIO("x,y,r,body,fx\n0,1,1,a,0\n"), **options)
+
+
 def one_disk(**options):
     return gf.from_disks([(1, 1)], [1], 0.5, **options)
 

@@ -3,6 +3,7 @@
 import io
 import itertools
 import json
+import warnings
 
 import numpy as np
 import pytest
@@ -62,6 +63,15 @@ def test_a_divided_wall_has_the_bounds_of_the_whole_one():
     assert packing.contact_points.tolist() == [[1, 0]] and packing.contacts.normal.tolist() == [
         [0, -1]
     ]
+
+
+def test_parts_that_overlap_are_named():
+    with pytest.warns(gf.InputWarning, match="parts of bodies 1 overlap: their common area"):
+        overlapping = [rectangle(2, 0, 3, 1), rectangle(2.5, 0, 4, 1)]
+        gf.blocks([[FOOT, ARM], overlapping, GROUND], 0.6, fixed=[2])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gf.blocks([[FOOT, ARM], GROUND], 0.6, fixed=[1])
 
 
 def test_a_corner_in_a_notch_touches_both_sides():

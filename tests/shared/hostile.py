@@ -191,6 +191,7 @@ def fault(function, arguments):
     with warnings.catch_warnings(record=True) as told, contextlib.redirect_stdout(io.StringIO()):
         warnings.simplefilter("always")
         warnings.simplefilter("ignore", gf.ResultWarning)  # a few states of a sample cannot mix
+        warnings.simplefilter("ignore", gf.InputWarning)  # of what can be used
         try:
             function(**arguments)
         except gf.InputError as error:

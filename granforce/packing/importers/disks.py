@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from granforce.packing.assemblies import with_network
+from granforce.cell import Cell
+from granforce.packing.assemblies import counted_twice, with_network
 from granforce.packing.importers.geometry import (
     check_disks,
     largest_gap,
+    overlapping,
     touching_contacts,
     with_doubts_noted,
 )
 from granforce.packing.importers.network import with_nearest_network
-from granforce.packing.importers.notes import packing_noted
+from granforce.packing.importers.notes import packing_noted, with_notes
 from granforce.packing.scenes import places_behind
 from granforce.records import (
     InputError,
@@ -77,7 +80,8 @@ def from_disks(
         P0 of a periodic cell, force per length; by default 1.
     clumps : (N,) array, optional
         Labels of rigid bodies: disks with one label move as one, and may overlap. Bodies follow the
-        order of labels; each needs centres that are not wrapped into the cell. Masses add up.
+        order of labels; each needs centres that are not wrapped into the cell. Masses add up, and
+        an InputWarning names bodies whose disks overlap.
     tolerance : float, default 10⁻⁶
         Disks closer than this, in largest radii, touch.
 
@@ -99,13 +103,14 @@ def from_disks(
     x = float_array(x, (-1, 2), "centres")
     if len(x) != len(r):
         raise InputError(f"disks need a centre and a radius each: {len(x)} centres, {len(r)} radii")
-    given, x = x, cell.wrapped(x)
-    bodies = np.arange(len(r)) if clumps is None else _bodies(clumps, len(r))
-    check_disks(x, r, cell, lambda k: f"disk {k}", rigid=bodies)
-    contacts = touching_contacts(x, r, cell, tolerance, rigid=bodies)
     closed = bool(np.all(np.isfinite(cell.box)))
     if pressure is not None and not closed:
         raise InputError("pressure applies to periodic boxes: leave it out, or give the box")
+    if clumps is not None:
+        return clumped(x, r, mu, cell, clumps, walls, gravity, tolerance, lambda k: f"disk {k}")
+    x = cell.wrapped(x)
+    check_disks(x, r, cell, lambda k: f"disk {k}")
+    contacts = touching_contacts(x, r, cell, tolerance)
     packing = make_packing(
         x,
         r,
@@ -117,12 +122,33 @@ def from_disks(
         info={"source": "disks"},
         tilt=cell.tilt,
     )
-    if clumps is not None:
-        if closed:
-            raise InputError("clumps need walls and gravity: leave out the box, or its side L_y")
-        return with_network(_clumped(enclosed(packing, walls, gravity, tolerance), given, bodies))
     packing = with_doubts_noted(packing, tolerance)
     return with_nearest_network(enclosed(packing, walls, gravity, tolerance), forces="found")
+
+
+def clumped(
+    x: Floats,
+    r: Floats,
+    mu: float,
+    cell: Cell,
+    clumps: npt.ArrayLike,
+    walls: str | npt.ArrayLike | None,
+    gravity: float,
+    tolerance: float,
+    place: Callable[[int], str],
+) -> Packing:
+    """The Packing of disks that are joined as in `from_disks`; place(k) names disk k."""
+    bodies, wrapped = _bodies(clumps, len(r)), cell.wrapped(x)
+    if np.all(np.isfinite(cell.box)):
+        raise InputError("clumps need walls and gravity: leave out the box, or its side L_y")
+    check_disks(wrapped, r, cell, place, rigid=bodies)
+    contacts = touching_contacts(wrapped, r, cell, tolerance, rigid=bodies)
+    none, info = np.zeros((len(contacts.i), 2)), {"source": "disks"}
+    packing = make_packing(wrapped, r, cell.box, contacts, none, mu, info=info)
+    i, j, gap = overlapping(wrapped, r, cell)
+    twice = np.unique(bodies[i[(bodies[i] == bodies[j]) & (-gap > tolerance * r.max())]])
+    joined = _joined(enclosed(packing, walls, gravity, tolerance), x, bodies)
+    return with_notes(with_network(joined), [counted_twice(twice)] if len(twice) else [])
 
 
 def _bodies(clumps: npt.ArrayLike, count: int) -> Integers:
@@ -137,7 +163,7 @@ def _bodies(clumps: npt.ArrayLike, count: int) -> Integers:
     return np.unique(labels, return_inverse=True)[1]
 
 
-def _clumped(packing: Packing, x: Floats, body: Integers) -> Packing:
+def _joined(packing: Packing, x: Floats, body: Integers) -> Packing:
     """A packing without forces, with its first disks, centres x, joined to bodies (k,)."""
     disks, more = len(x), len(packing.r) - len(x)
     count = int(body.max()) + 1

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from granforce.cell import Cell
-from granforce.packing.importers.disks import enclosed
+from granforce.packing.importers.disks import clumped, enclosed
 from granforce.packing.importers.geometry import (
     check_disks,
     components,
@@ -45,7 +45,8 @@ from granforce.tolerances import LISTED_TOUCHING
 from granforce.types import Floats
 
 # Columns of grains.
-NAMES = ("id", "x", "y", "r", "fx", "fy", "torque", "open")
+NAMES = ("id", "x", "y", "r", "fx", "fy", "torque", "open", "body")
+_LOADS = {"fx", "fy", "torque", "open"}
 NAMES += ("i", "j", "nx", "ny", "length", "f_n", "f_t")
 _SHORT = {"fn": "f_n", "ft": "f_t"}  # names that many tables have
 _TOTAL = ("fx", "fy")  # the force on j, instead of its components f_n, f_t
@@ -73,8 +74,9 @@ def read_table(
     Parameters
     ----------
     grains : path, open file or DataFrame
-        CSV with columns x, y, r; optionally id; fx, fy, torque (external load in an open set); and
-        open, 1 if the balance of a grain is not required and 0 otherwise.
+        CSV with columns x, y, r; optionally id; fx, fy, torque (external load in an open set);
+        open, 1 if the balance of a grain is not required and 0 otherwise; and body, the label of
+        a rigid body that disks are joined to, as for `from_disks`.
     contacts : path, open file or DataFrame, optional
         Columns i, j (ids, or row numbers from 0 without an id column); optionally nx, ny, length
         (otherwise nearest images are joined) and f_n, f_t (or fn, ft), or the total force on j as
@@ -127,6 +129,15 @@ def read_table(
     pressure = positive(1.0 if pressure is None else pressure, "pressure")
     table, pairs = _tables(grains, contacts, columns)
     check_grains(len(table.rows), most_grains, table.name)
+    if "body" in table.header:
+        if pairs is not None or forces or reverse or prescribed or _LOADS & set(table.header):
+            raise InputError(
+                "a column body joins disks that touch to rigid bodies under gravity: leave out "
+                "contacts, forces, loads, open and the pressure"
+            )
+        x, y, r = (table.numbers(name) for name in "xyr")
+        labels, given = np.array(table.fields("body")), (walls, gravity, tolerance)
+        return clumped(np.column_stack([x, y]), r, mu, cell, labels, *given, table.place)
     x, r = _disks(table, cell)
     load = _loads(table, cell)
     if pairs is not None:
@@ -213,8 +224,7 @@ def _with_full_names(table: Table) -> Table:
 
 def _disks(table: Table, cell: Cell) -> tuple[Floats, Floats]:
     r = table.numbers("r")
-    x = np.column_stack([table.numbers("x"), table.numbers("y")])
-    x = cell.wrapped(x)
+    x = cell.wrapped(np.column_stack([table.numbers("x"), table.numbers("y")]))
     check_disks(x, r, cell, table.place)
     return x, r
 
