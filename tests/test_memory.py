@@ -111,7 +111,13 @@ PRESSURES = b"grain,pressure,sigma\n0,1.5,0.1\n"
 BOUNDS = b"contact,f_n_low,f_n_high\n0,0,2\n"
 _part = {"states": 8, "chains": 2}
 
+
 # Every public function that computes, or reads: of an Ensemble of 20 disks and a folder.
+def looked_up(S, folder):
+    with gf.cached(folder / "store.zarr"):
+        return gf.intervals(S, contacts=[0])
+
+
 CALLS = {
     "ensemble": lambda S, _: gf.ensemble(S.packing).dimension,
     "frozen": lambda S, _: frozen(S),
@@ -179,6 +185,8 @@ CALLS = {
     "measures": lambda S, _: measured(S),
     "to_dataset": lambda S, _: gf.to_dataset(S.original, S),
     "to_dataframe": lambda S, _: gf.to_dataframe(S.original, S),
+    "to_arviz": lambda S, _: gf.to_arviz(S.original[None, None], S),
+    "cached": lambda S, folder: looked_up(S, folder),
     "plot": lambda S, _: gf.plot(S.packing, backend="matplotlib"),
     "from_disks": lambda S, _: gf.from_disks([[1, 1]], [1], 0.5, walls="floor", gravity=1),
 }

@@ -26,6 +26,8 @@ KERNELS = {
     ("system/part_compiler.py", "numba.core.compiler"),
     ("system/part_compiler.py", "_engine"),
     ("system/part_compiler.py", "_add_module"),
+    ("system/part_compiler.py", "_final_module"),
+    ("system/part_compiler.py", "_unserialize"),
 }
 # documented, in spite of their names
 _OURS = {"_asdict", "_fields", "_make", "_replace", "_exit", "_repr_mimebundle_"}
