@@ -156,8 +156,8 @@ OPTIONS = {
         "particles: NAME.data, also if its files are NAME.data.0000, NAME.data.0001, …", Series
     ),
     "grains:table": Option(
-        "columns x, y, r; optionally id, fx, fy, torque (external load, without --box) and open "
-        "(1: balance not required, 0)",
+        "columns x, y, r; optionally id, fx, fy, torque (external load, without --box), open "
+        "(1: balance not required, 0) and body (label of the rigid body of disks on a floor)",
         Input,
     ),
     "grains:blocks": Option(
