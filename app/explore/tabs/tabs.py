@@ -129,10 +129,9 @@ class Tabs:
             if name in PLOTTED and not (name == "plane" and self.looks.wide):  # there once
                 pieces.append(figure.panel(self.state, TABS[name].lower().replace(" ", "_")))
             # Two at a time, first choices and a sentence: Bokeh processes everything at each step.
-            queued = []
-            for k in range(0, len(pieces), 2):
-                queued += pieces[k : k + 2]
-                self.pages[name][:] = queued
+            # What can be unfolded comes last: it would be built anew with anything that follows.
+            for end in (*range(2, len(pieces) - 1, 2), len(pieces)):
+                self.pages[name][:] = pieces[:end]
                 yield
             self.looks.views += 1
 
