@@ -38,6 +38,7 @@ def ordered(
         return Order(replay.order, f"{SORTS[USUAL]}: {why}")
     order = replay.order if by == USUAL else np.argsort(value, kind="stable")
     given = " given the held forces" if by in ("exact", "position") and narrowed else ""
+    given = ", held first, then the largest" if by == "shortened" else given
     return Order(order, SORTS[by] + given)
 
 
@@ -48,7 +49,11 @@ def _value(replay: Replay, exact: Bounds, by: str, narrowed: Narrowed | None) ->
     if by == "extent":
         return replay.high[:, 0] - replay.low[:, 0]
     if by == "shortened":
-        return None if narrowed is None else -narrowed.shortened
+        if narrowed is None:
+            return None
+        value = -narrowed.shortened
+        value[[one.contact for one in narrowed.known]] = -np.inf  # all of their interval is gone
+        return value
     if not exact:
         return None
     extent = exact["high"] - exact["low"]
