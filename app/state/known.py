@@ -376,7 +376,7 @@ def ranking(
         params = kinds.INFORMATIVE.parameters(
             selection.packing, check=LISTED if few else CHECKED, k=LISTED, **given
         )
-        stage = "the best contacts to measure next, from random networks"
+        stage = "the best contacts to measure next, from uniform networks"
 
         def watch(found: Any) -> None:
             job.so_far, job.stage = ranked(*found[:4]), "exact bounds of the best contacts"

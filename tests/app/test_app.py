@@ -641,7 +641,9 @@ def test_the_sentence_of_the_intervals_says_what_is_drawn(state):
     state.choose(mu=1)
     wait_for(state)
     view = View(state)
-    assert "pale" not in view.lead.object and f"in {STATES} random networks" in view.lead.object
+    assert (
+        "pale" not in view.lead.object and f"in {STATES} networks of the walk" in view.lead.object
+    )
     state.compute_exact()
     assert "pale: exact, as bounds are found" in view.lead.object
     wait_for(state)

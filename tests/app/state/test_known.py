@@ -11,6 +11,7 @@ from app.explore.results_line import results
 from app.explore.status_line import bounds
 from app.explore.tabs.intervals.intervals import View
 from app.explore.tabs.intervals.known_forces import Known, meaning, words
+from app.explore.tabs.intervals.order import ordered
 from app.packing.captions import PACKED, network
 from app.packing.legend import legend
 from app.packing.player import Player
@@ -36,6 +37,8 @@ def test_a_held_force_narrows_the_others(state):
     assert np.all(found.extents[1] <= found.extents[0] + 1e-6)
     assert found.extents[1][4] < 1e-6 and found.shortened[4] == 0 < found.shortened.max()
     assert state.possible is found.after
+    order = ordered(state.replay, {}, "shortened", found).contacts
+    assert order[0] == 4 and np.all(np.diff(found.shortened[order[1:]]) <= 0)
     held(state, 9)
     assert (
         state.knowledge.narrowed.dimension == (h, h - 2) and state.knowledge.narrowed.mean[1] < less
@@ -330,6 +333,7 @@ def test_which_to_measure_next_is_in_order_and_worth_it(state):
     assert known.meaning == meaning(best, "") and not known.asking
     assert best.known == tuple(state.knowledge.known) and 4 not in best.contacts
     assert meaning(best, "").startswith("Exact: mean interval")
+    assert "with this force held at its mean" in meaning(best, "")
     some = best._replace(after=np.where(np.arange(len(best.after)) < 3, best.after, np.nan))
     assert "best 3" in meaning(some, "") and "standard deviation" in meaning(some, "")
     assert np.all(np.diff(best.after) >= 0) and best.after[0] < best.before

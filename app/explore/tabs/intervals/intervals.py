@@ -149,9 +149,11 @@ def sentence(
     elif state.work.arriving is not None:
         parts.append(mark(PALE, "pale: exact, as bounds are found"))
     count = replay.summary["states"]
-    random = "random networks so far" if state.growing else f"{count} random networks"
+    kind = "sample" if state.on_screen and state.on_screen.kind == "uniform" else "walk"
+    networks = f"{'the' if state.growing else count} networks of the {kind}"
+    networks += " so far" * state.growing
     if narrowed is None or state.obeying:
-        parts.append(mark(DARK, f"dark: {term('seen', 'seen')} in {random}"))
+        parts.append(mark(DARK, f"dark: {term('seen', 'seen')} in {networks}"))
     parts.append(mark(now(state.looks.dark), _dot(state), "50%"))
     if replay.given:
         parts.append(mark(ORIGINAL, term("original", "as packed"), "50%"))

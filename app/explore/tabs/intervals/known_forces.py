@@ -120,7 +120,10 @@ def meaning(best: Ranked | None, running: str) -> str:
     exact, listed = int(np.isfinite(best.after).sum()), len(best.after)
     if exact:
         which = "" if exact == listed else f" for the best {exact}"
-        lines.append(f"Exact{which}: mean interval of all fₙ, now → with this force known.")
+        lines.append(
+            f"Exact{which}: mean interval of all fₙ, now → with this force held at its mean over "
+            "uniform networks."
+        )
     if exact < listed:
         rest = "The others are estimated" if exact else "Estimated"
         why = (
@@ -129,7 +132,7 @@ def meaning(best: Ranked | None, running: str) -> str:
             else "exact bounds of every contact would take too long"
         )
         lines.append(
-            f"{rest} from random networks: decrease of the mean standard deviation of all fₙ, with "
+            f"{rest} from uniform networks: decrease of the mean standard deviation of all fₙ, with "
             f"this force known; {why}."
         )
     return " ".join(lines)
