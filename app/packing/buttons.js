@@ -97,10 +97,7 @@ export class Buttons {
       else target.value = target.defaultValue
     })
     const extras = this.part("extras")
-    extras.addEventListener("toggle", () => {
-      open("check", extras.open)
-      if (extras.open && extras.matches(":focus-within")) this.part("skips").scrollIntoView({ block: "nearest" })
-    })
+    extras.addEventListener("toggle", () => open("check", extras.open))
     const force = this.part("force")
     force.addEventListener("input", () => { this.typed = true })
     force.addEventListener("change", () => {

@@ -132,8 +132,8 @@ def meaning(best: Ranked | None, running: str) -> str:
             else "exact bounds of every contact would take too long"
         )
         lines.append(
-            f"{rest} from uniform networks: decrease of the mean standard deviation of all fₙ, with "
-            f"this force known; {why}."
+            f"{rest} from uniform networks: decrease of the mean standard deviation of all fₙ, "
+            f"with this force known; {why}."
         )
     return " ".join(lines)
 
