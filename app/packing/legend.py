@@ -31,7 +31,8 @@ LEGEND = """
   </svg> {shown:.3g} ⟨fₙ⟩{wide_bounds}</span>
 <span tabindex="0" data-term="rattler">faint disks: no force</span>
 <details><summary>Scales</summary>
-<label title="auto: for ΔFₙ, its {saturation:g} quantile in this packing">colours full at
+<label title="auto: for ΔFₙ and changes by a push, their {saturation:g} quantile in this packing">
+  colours full at
   <input name="full" type="number" step="any" placeholder="auto"
   min="{full_least:g}" max="{full_most:g}" value="{full}"> ⟨fₙ⟩</label>
 <label>widths times <input name="stretch" type="number" step="any"
@@ -133,10 +134,19 @@ def _saturation(replay: Replay, exact: xr.Dataset | None) -> float:
     return float(np.quantile(extent, SATURATION)) if len(extent) else 0.0
 
 
+def full_change(state: AppState) -> float:
+    """Change of f_n in ⟨f_n⟩ for full colour; by a push, of most contacts at F_crit."""
+    pushed, full = state.pushed, state.looks.full
+    if full is not None or state.looks.pulled != "push" or pushed is None:
+        return float(full or FULL_CHANGE)
+    normal = pushed.path["normal"].reshape(len(pushed.path["values"]), -1)
+    return float(f"{np.quantile(abs(normal[-1] - normal[0]), SATURATION):.1g}") or FULL_CHANGE
+
+
 def colour_bar(state: AppState) -> tuple[str, list[str], str]:
     """The ends of the colour scale in words, and its colours: (low, [stops], high)."""
     looks, scales = state.looks, palettes(state.looks.dark)
-    full = looks.full or FULL_CHANGE
+    full = full_change(state)
     change = f"≤ −{full:.3g}", DIVERGING, f"≥ +{full:.3g} ⟨fₙ⟩"
     return {
         "mobilised": MOBILISED,

@@ -10,7 +10,7 @@ from ..background.notifications import observe
 from ..browser.bundle import Scripted
 from ..browser.messages import Array, forward, from_browser
 from ..results import compute, progress_feed
-from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
+from ..results.geometry import CHAIN_WIDTH, FULL_DEVIATION
 from ..results.replays import Replay, worded
 from ..state.app_state import AppState
 from ..state.view_settings import Appearance
@@ -18,6 +18,7 @@ from ..widgets.plot_style import palettes
 from .legend import (
     THRUST,
     exact_intervals,
+    full_change,
     full_colour,
     jamming,
     legend,
@@ -47,7 +48,7 @@ APPEARANCE = sorted(set(Appearance.param) - {"name"})
 SHARED = ("contact", "frame", "reference", "split", "beside", "colour", "thickness", "full")
 SHARED += ("stretch", "paused", "opened", "pulled")
 
-SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATION}
+SCALES = {"width": CHAIN_WIDTH, "deviation": FULL_DEVIATION}
 
 
 class Player(Scripted, Appearance):
@@ -83,6 +84,7 @@ class Player(Scripted, Appearance):
     reduction = param.Array(default=None, doc="(N_c,) of ΔF_n in ⟨f_n⟩ by what is known, or None")
     measured = param.Dict(default={}, doc="of a frame, see legend.measured")
     most = param.Number(default=0.0, doc="ΔF_n in ⟨f_n⟩ at which its colour is full")
+    change = param.Number(doc="change of f_n in ⟨f_n⟩ at which its colour is full")
     pins = param.Dict(default={}, doc="contacts that are known, and to measure; see legend.pins")
     thrust = param.Dict(default={}, doc="where resultants at joints pass, see drawing/thrust.js")
     plane = param.Dict(default={}, doc="of force space on screen, see legend.projection")
@@ -135,6 +137,7 @@ class Player(Scripted, Appearance):
             self._explain, state, "looks.colour", "looks.thickness", "looks.full", "looks.stretch",
             "looks.dark", "looks.tab", "looks.reference", "looks.pulled", "shown", "exact", "loads",
             "measured", "knowledge.known", "knowledge.narrowed", "hand.pulls", "work.moving",
+            "pushed",
         )  # fmt: skip
         observe(self._turn, looks, "tab")
         self._bounding = state.work.task(reported=False)
@@ -251,6 +254,7 @@ class Player(Scripted, Appearance):
         if self._state.work.moving:
             self.legend = jamming(self._state)
             return
+        self.change = full_change(self._state)
         self.legend = legend(self._state) + (THRUST if self.thrust else "")
 
 

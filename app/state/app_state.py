@@ -63,6 +63,7 @@ class AppState(param.Parameterized):
     before = param.Parameter(doc="the Shown before the last change if only μ changed, or None")
     source = param.String(doc="where the states on screen come from, in words")
     plane = param.Parameter(doc="the planes.Plane of force space on screen, or None")
+    pushed = param.Parameter(doc="the perturbations.Pushed of the contact in Push, or None")
     motion = param.Parameter(doc="the perturbations.Motion drawn on the packing, or None")
 
     def __init__(

@@ -86,6 +86,7 @@ class View(TabView):
         if self.pushed is not None and self.pushed[1:] != (self.contact, replay):
             self.task.cancel()
             self.pushed, self.reached = None, False
+        self.state.pushed = self.pushed and self.pushed[0]
         one, fixed = what == "one", replay is None or replay.summary["mu"] == 0
         self.load.visible = one and not fixed
         self.every.visible = what == "all" and not fixed and self.loads is None
