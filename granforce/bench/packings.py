@@ -7,6 +7,7 @@ import numpy as np
 
 from granforce.bench.runner import Row, growth_of, means, note
 from granforce.forces.build import ensemble
+from granforce.motion.rest import rest
 from granforce.packing.compaction import pack
 from granforce.records import NotJammedError
 from granforce.system.clock import timed
@@ -40,7 +41,7 @@ def compaction(
 def compaction_frictions(
     n: int = 400, frictions: Sequence[float] = FRICTIONS, seeds: int = 5
 ) -> list[Row]:
-    """Rows: time to a certified packing at each μ: median and slowest of the seeds."""
+    """Rows: time to a certified packing at each μ: median, slowest; mean of its test of rest."""
     return [_row(n, mu, seeds) for mu in frictions]
 
 
@@ -75,6 +76,8 @@ def _packed(n: int, mu: float, seed: int, **options: Any) -> Row:
     S = ensemble(packing)
     return {
         "seconds": seconds,
+        "seconds_rest": timed(rest, packing)[0],
+        "systems": packing.info["linear_systems"],
         "steps": packing.info["steps"],
         "contact_updates": packing.info["contact_updates"],
         "networks_tried": packing.info["certificates_tried"],

@@ -106,7 +106,7 @@ def test_compaction_rows():
     assert rows[0]["z"] == pytest.approx(S.coordination)
     assert rows[0]["h"] == S.dimension
     assert rows[0]["phi"] == pytest.approx(S.packing.packing_fraction)
-    assert {"seconds", "steps", "contact_updates", "overlap"} <= rows[0].keys()
+    assert {"seconds", "steps", "systems", "contact_updates", "overlap"} <= rows[0].keys()
     assert "phi" not in rows[1]
 
 
@@ -139,7 +139,7 @@ def test_kernels_are_compiled_before_packings_are_timed(monkeypatch):
 def test_compaction_at_each_friction_and_size():
     rows = bench.compaction_frictions(n=30, frictions=(0.3, 1.0), seeds=2)
     assert [row["mu"] for row in rows] == [0.3, 1.0]
-    assert all(0 < row["seconds"] <= row["slowest"] for row in rows)
+    assert all(0 < row["seconds"] <= row["slowest"] and row["seconds_rest"] > 0 for row in rows)
     rows = bench.compaction_growth(mu=0.3, sizes=(20, 30), seeds=1)
     assert [row["n"] for row in rows] == [20, 30, "fit"]
     assert np.isfinite(rows[-1]["exponent"])
