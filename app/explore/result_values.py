@@ -178,7 +178,7 @@ def _networks(replay: Replay) -> str:
 
 def _doubts(r_hat: float, size: float, least: float) -> Iterator[str]:
     if r_hat > MIXED:
-        yield f"not mixed: R̂ = {r_hat:.2f}, more than {MIXED:g}; ask for more networks"
+        yield f"not mixed: R̂ = {r_hat:.2f}, more than {MIXED:g}"
     if size < least:
         yield (
             f"worth {size:.0f} independent networks, fewer than the {least:g} that reliable errors "

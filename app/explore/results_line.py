@@ -25,6 +25,7 @@ UNBOUNDED = (
     "is undefined. To bound S, select such a contact and hold its force (H) or, if it is friction "
     "that wedges the grains, choose a smaller μ."
 )
+MORE = "; ask for more networks"
 UNIT = {"extent": " ⟨fₙ⟩"}
 FOLD = '<button type="button" class="fold" title="all numbers, with their meaning"></button>'
 
@@ -104,8 +105,11 @@ def results(state: AppState, volume: xr.Dataset | None = None) -> str:
     packing = result_values.packing(state, volume)
     unknown = "being measured" if state.work.measuring.running else MEASURE
     values = [one.exact or unknown for one in packing]
-    doubts = [result_values.unborne(state.replay), sampling and sampling.doubt]
-    doubts.append(UNBOUNDED if result_values.unbounded(state.replay.summary) else "")
+    doubts = [result_values.unborne(state.replay)]
+    endless = result_values.unbounded(state.replay.summary)
+    if sampling and sampling.doubt:  # no number of networks fills an unbounded S
+        doubts.append(sampling.doubt + ("" if endless else MORE))
+    doubts.append(UNBOUNDED if endless else "")
     doubt = "".join(f'<p class="flag" role="note">⚠ {line}</p>' for line in filter(None, doubts))
     now, was = Shown(state.cell, state.replay, state.exact), state.before
     change = "" if was is None else f'<p class="was">{result_values.changes(was, now)}</p>'

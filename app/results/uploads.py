@@ -164,13 +164,14 @@ def read(
     pressure: float | None = None,
     walls: str | None = None,
     gravity: float = 0.0,
+    tolerance: float | None = None,
     limits: Limits = LIMITS,
 ) -> Packing:
     """The Packing in files {role: (name, content)}.
 
-    mu: friction coefficient, which an NPZ contains; box (L_x, L_y) or None, tilt, pressure, walls
-    and gravity: for a table, as in `read_table`. Raises InputError, naming file and line, for
-    invalid files and beyond the limits.
+    mu: friction coefficient, which an NPZ contains; box (L_x, L_y) or None, tilt, pressure, walls,
+    gravity and tolerance: as in `read_table`; tolerance also as in `read_blocks`. Raises
+    InputError, naming file and line, for invalid files and beyond the limits.
     """
     if pressure is not None:
         limits.check(pressure=pressure)
@@ -183,7 +184,7 @@ def read(
             given["particles"], given["contacts"], mu, most_grains=limits.n
         )
     elif "bodies" in files:
-        packing = importers.read_blocks(given["bodies"], mu=mu)
+        packing = importers.read_blocks(given["bodies"], mu=mu, tolerance=tolerance)
     else:
         packing = importers.read_table(
             given["grains"],
@@ -194,6 +195,7 @@ def read(
             pressure=pressure,
             walls=walls,
             gravity=gravity,
+            tolerance=tolerance,
             most_grains=limits.n,
         )
     limits.check(mu=packing.mu, n=len(packing.r))

@@ -277,7 +277,7 @@ def _up(gap: float) -> str:
 
 def larger_tolerance(pairs: str) -> str:
     """Words on pairs that nearly touch, with what makes them contacts."""
-    return f"{pairs}: a larger --tolerance (tolerance=) makes them contacts"
+    return f"{pairs}: a larger tolerance (--tolerance, or tolerance=) makes them contacts"
 
 
 def counted_twice(bodies: Iterable[Any]) -> str:

@@ -819,7 +819,7 @@ LINKS = "i,j,fn,ft\n7,8,1,0\n8,9,1,0\n"
             "x,y,r\n0,1,1\n2,1,1\n1,2.7322,1\n",
             None,
             {"walls": "floor", "gravity": 1},
-            "2 pairs nearly touch, with gaps from 0.00013 .*: a larger --tolerance",
+            r"2 pairs nearly touch, with gaps from 0.00013 .*: a larger tolerance \(--tolerance,",
         ),
     ],
 )

@@ -27,7 +27,7 @@ from .my_computations import Mine
 
 STATES = 200  # of the first walk
 SAMPLES = {
-    "disks": "Table of disks (walls: a floor and two sides, gravity: 1)",
+    "disks": "Table of disks (friction: 0.5, walls: a floor, gravity: 1)",
     "bodies": "Table of bodies",
     "lammps": "LAMMPS: two dumps",
     "photoelastic": "Photoelastic frame: two lists",
@@ -42,8 +42,10 @@ for <code>granforce import blocks</code>; <b>photoelastic frames</b>, as PeGS wr
 <code>_solved.mat</code> of PeGS 2, for which the nearest balanced forces are computed. Positions
 with a line of headers may have a column G2 or pressure: with its calibration a, b, σ, each disk has
 a measured pressure a G² + b ± σ, too. Something must hold the disks of a table: enter a periodic
-box, or walls and gravity, or give columns fx, fy, torque with the load on each disk. Files are read
-into memory. A packing is saved in the cache; a frame is saved only if you open it as a packing.
+box, or walls and gravity, or give columns fx, fy, torque with the load on each disk. Tolerance is
+the largest gap of a contact: in largest radii (default 10⁻⁶), or, of bodies, in the unit of the
+file (default 10⁻⁹ of the largest body). Files are read into memory. A packing is saved in the
+cache; a frame is saved only if you open it as a packing.
 """
 HOLD_WANTED = (
     "What holds the disks? Enter the sides of a periodic box in Box, such as 30, 30, and its tilt, "
@@ -84,6 +86,7 @@ class View:
         self.pressure = pmui.TextInput(label="Pressure", placeholder="1", **SMALL)
         self.around = Select(label="Walls", options=by_words(AROUND), width=190, margin=(4, 8))
         self.gravity = pmui.TextInput(label="Gravity", placeholder="0", **SMALL)
+        self.tolerance = pmui.TextInput(label="Tolerance", placeholder="default", **SMALL)
         self.walls = Select(label="Walls", options=by_words(WALLS), width=150, margin=(4, 8))
         self.calibration = pmui.TextInput(
             label="Pressure calibration a, b, σ", placeholder="not used", **SMALL | {"width": 200}
@@ -108,7 +111,7 @@ class View:
             self.dropper,
             pn.FlexBox(
                 *(self.mu, self.box, self.pressure, self.around, self.gravity),
-                *(self.walls, self.calibration, self.reverse, self.read),
+                *(self.tolerance, self.walls, self.calibration, self.reverse, self.read),
                 sizing_mode="stretch_width",
             ),
             self.error,
@@ -139,6 +142,7 @@ class View:
         self.calibration.visible = uploads.lists_pressures(self.files)
         for field in (self.box, self.pressure, self.around, self.gravity):
             field.visible = kind == "table"
+        self.tolerance.visible = kind in ("table", "blocks")
         self.read.visible = self.mu.visible and not uploads.missing(self.files)
 
     def _dropped(self, new: list[tuple[str, bytes]]) -> None:
@@ -186,6 +190,8 @@ class View:
         if given := self.calibration.visible and _entered(self.calibration):
             numbers = map(number_or_nan, given.replace(",", " ").split())
             options["calibration"] = checked_calibration(list(numbers))
+        if tolerance := self.tolerance.visible and _entered(self.tolerance):
+            options["tolerance"] = positive(typed(tolerance), "Tolerance")
         if kind == "table":
             options |= self._holding()
         return options
