@@ -92,10 +92,19 @@ def push(library: Library, cell: Cell, replay: Replay, contact: int) -> Callable
         params = kinds.PERTURBATION.parameters(
             cell.selection.packing, mu=cell.selection.mu, contacts=[int(replay.backbone[contact])]
         )
-        stage = "contact dynamics under a growing load"
-        dataset = load_or_compute(  # of one contact, whose part done is not known
-            library, job, stage, kinds.PERTURBATION, params, progress=lambda done, total: None
-        )
+        stage = "limit load, then contact dynamics under a growing load"
+        scale = replay.force_scale
+
+        def watch(load: float, limit: float) -> None:
+            job.stage = (
+                f"at rest under {load / scale:.3f} ⟨fₙ⟩, limit load {limit / scale:.3f} ⟨fₙ⟩"
+            )
+            job.tell(load, limit)
+
+        dataset = load_or_compute(
+            library, job, stage, kinds.PERTURBATION, params, watch=watch,
+            progress=lambda done, total: None,  # of contacts, of which there is one
+        )  # fmt: skip
         low = dataset["critical_low"].values[0].item()
         job.begin("networks under smaller loads")
         under = puller_of(library, cell, []).loaded(int(replay.backbone[contact]), low)

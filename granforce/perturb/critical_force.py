@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
+from functools import partial
 from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -207,6 +208,7 @@ def critical_forces(
     limit_loads: Sequence[float] | Floats | None = None,
     workers: int = 1,
     finished: Callable[[int, CriticalForce], object] | None = None,
+    watch: Callable[[int, float], object] | None = None,
     cancel: Cancel | None = None,
     **protocol: Any,
 ) -> list[CriticalForce]:
@@ -224,6 +226,8 @@ def critical_forces(
         Threads. No result depends on their number, nor on the other contacts.
     finished : callable, optional
         finished(k, CriticalForce) is called from the threads as each ends.
+    watch : callable, optional
+        watch(k, force) is called from the threads with each load at rest, which may fall again.
     cancel : callable, optional
         Polled; returning True raises Cancelled.
     **protocol
@@ -268,9 +272,14 @@ def critical_forces(
         raise UndecidedError(f"the limit load of contact {number} could not be certified")
     step, start = make_step(S), starting_network(S) / S.force_scale
     searches = [
-        _pushed(S, int(contact), position, float(limit) / S.force_scale, start, protocol)
-        for contact, position, limit in zip(contacts, positions, limit_loads, strict=True)
-    ]
+        _pushed(
+            S, int(contact), position, float(limit) / S.force_scale, start, protocol,
+            None if watch is None else partial(watch, k),
+        )
+        for k, (contact, position, limit) in enumerate(
+            zip(contacts, positions, limit_loads, strict=True)
+        )
+    ]  # fmt: skip
     found = {}
 
     def ended(k: int, critical: CriticalForce) -> None:
@@ -313,10 +322,17 @@ def _check_limits(
 
 
 def _pushed(
-    S: Ensemble, contact: int, position: int, limit: float, start: Floats, protocol: Protocol
-) -> Asking[CriticalForce]:
+    S: Ensemble, contact: int, position: int, limit: float, start: Floats, protocol: Protocol,
+    watch: Callable[[float], object] | None,
+) -> Asking[CriticalForce]:  # fmt: skip
     """Generator for `flow_lanes.follow`: the CriticalForce of a contact."""
-    found = yield from raised(Push(start, position, 0.0, 0, 0.0), limit, protocol)
+
+    def at_rest(load: float) -> None:
+        if watch is not None:
+            watch(load * S.force_scale)
+
+    push = Push(start, position, 0.0, 0, 0.0)
+    found = yield from raised(push, limit, protocol, at_rest)
     loaded = found.forces.copy()
     loaded[position, 0] += found.low
     return CriticalForce(
@@ -345,8 +361,13 @@ class Raised(NamedTuple):
     counts: dict[str, float]  # COUNTS, and seconds
 
 
-def raised(push: Push, limit: float, protocol: Protocol) -> Asking[Raised]:
-    """Generator for `flow_lanes.follow`: raise the load of a Push from 0, and from its forces."""
+def raised(
+    push: Push, limit: float, protocol: Protocol, at_rest: Callable[[float], object] | None = None
+) -> Asking[Raised]:
+    """Generator for `flow_lanes.follow`: raise the load of a Push from 0, and from its forces.
+
+    at_rest(load) is called with each load at rest, which falls where the search steps back.
+    """
     counts: dict[str, float] = dict.fromkeys((*COUNTS, "seconds"), 0)
     past = deque([(0.0, push.forces)], maxlen=2 * BACK)  # the last loads at rest, and their forces
     share, moved_at, max_steps = 1.0, 0.0, protocol.max_steps
@@ -365,6 +386,8 @@ def raised(push: Push, limit: float, protocol: Protocol) -> Asking[Raised]:
         if outcome.at_rest:
             past.append((load, outcome.forces))
             share = 1.0 if load >= moved_at else share
+            if at_rest is not None:
+                at_rest(load)
         elif final:
             return Raised(low, load, forces, outcome, counts)
         else:

@@ -113,15 +113,16 @@ def test_what_is_given_up_too_early_is_followed_before_it_counts_as_motion():
 
 
 def test_contacts_carried_side_by_side_are_as_alone_to_the_last_bit():
-    S, told = ensemble(packed(40, 0.3)), []
+    S, told, rested = ensemble(packed(40, 0.3)), [], set()
     contacts = S.index[::5]
     limit = limit_loads(S, contacts)
     alone = [critical_force(S, c, limit_load=load) for c, load in zip(contacts, limit, strict=True)]
     assert len({critical.counts["linear_systems"] for critical in alone}) > 5
     for workers in (1, 2):
         together = critical_forces(
-            S, contacts, workers=workers, finished=lambda k, one: told.append((k, one.low))
-        )
+            S, contacts, workers=workers, finished=lambda k, one: told.append((k, one.low)),
+            watch=lambda *load: rested.add(load),
+        )  # fmt: skip
         for one, other in zip(together, alone, strict=True):
             assert one.contact == other.contact and one.counts == other.counts
             assert (one.low, one.high, one.converged) == (other.low, other.high, other.converged)
@@ -129,6 +130,8 @@ def test_contacts_carried_side_by_side_are_as_alone_to_the_last_bit():
             assert (one.moving is None) == (other.moving is None)
             if one.moving is not None:
                 assert np.array_equal(one.moving.velocity, other.moving.velocity)
+    assert {load for load in told if load[1]} <= rested
+    assert all(load <= limit[k] for k, load in rested)
     assert sorted(told[: len(contacts)]) == [(k, one.low) for k, one in enumerate(alone)]
 
 

@@ -1,6 +1,6 @@
 """Kinds of perturbations: of one contact, and of many as one result."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -68,9 +68,17 @@ def _protocol(precision: Any, rise: Any, max_steps: Any) -> Parameters:
 
 
 def _perturbation(
-    store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
+    store: Store,
+    parameters: Parameters,
+    *,
+    workers: int,
+    progress: Progress | None,
+    watch: Callable[[float, float], object] | None = None,
 ) -> xr.Dataset:
-    """Dataset of critical forces, first motions and α; each contact is stored as it ends."""
+    """Dataset of critical forces, first motions and α; each contact is stored as it ends.
+
+    watch(load, limit load) is called, in force, with each load at rest of a contact.
+    """
     S = ensemble_of(store, parameters)
     chosen = S.index if parameters["contacts"] is None else np.array(parameters["contacts"])
     if parameters["random"] is not None:
@@ -79,7 +87,7 @@ def _perturbation(
         chosen = S.index[np.sort(order[: parameters["random"]])]
     if not len(chosen):
         raise InputError("no contact to perturb")
-    parts = _perturbed(store, S, chosen, parameters, workers, progress)
+    parts = _perturbed(store, S, chosen, parameters, workers, progress, watch)
     return perturbation_dataset(S, parts)
 
 
@@ -90,6 +98,7 @@ def _perturbed(
     parameters: Parameters,
     workers: int,
     progress: Progress | None,
+    watch: Callable[[float, float], object] | None,
 ) -> list[xr.Dataset]:
     """Datasets of the single contacts, in order, loaded from the store if possible."""
     shared = ("packing", "mu", *Protocol._fields, "prescribed", "stress")
@@ -116,6 +125,7 @@ def _perturbed(
         limit_loads=loads.load,
         workers=workers,
         finished=ended,
+        watch=watch and (lambda k, load: watch(load, float(loads.load[k]))),
         **_named_protocol(parameters),
     )
     return [parts[c] for c in chosen]

@@ -259,6 +259,15 @@ def test_rounded_places_need_a_tolerance(state):
     assert state.replay.summary["contacts"] == 5
 
 
+def test_a_push_says_how_far_it_got(state, monkeypatch):
+    """Its limit load, and loads at rest, of which the last is F_crit."""
+    told = []
+    monkeypatch.setattr(Job, "tell", lambda job, *progress: told.append(job.stage))
+    pushed = perturbations.push(state.library, state.cell, state.replay, 4)(Job(lambda job: None))
+    words = f"at rest under {pushed.low:.3f} ⟨fₙ⟩, limit load {pushed.limit:.3f} ⟨fₙ⟩"
+    assert words in told and len(set(told)) > 5
+
+
 def test_a_packing_without_stress_in_one_direction_has_a_warning(state):
     """A row of disks that touches its images, in a box with room above."""
     view, results = upload_view.View(state), Results(state)
