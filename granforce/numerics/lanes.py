@@ -27,11 +27,16 @@ from numba import config, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
-from granforce.system.compiled import skip_unreadable_indices, tell_when_compiling
+from granforce.system.compiled import (
+    recompile_after_any_change,
+    skip_unreadable_indices,
+    tell_when_compiling,
+)
 from granforce.system.part_compiler import PartCompiler
 from granforce.types import Floats
 
 skip_unreadable_indices()
+recompile_after_any_change()
 
 LANES = 8
 # To see these messages: logging.basicConfig(level=logging.INFO).

@@ -4,6 +4,8 @@ The location must be set before numba is imported.
 """
 
 import atexit
+import functools
+import hashlib
 import os
 import stat
 import subprocess
@@ -108,6 +110,33 @@ def skip_unreadable_indices() -> None:
             return {}
 
     IndexDataCacheFile._load_index = read_or_none
+
+
+def recompile_after_any_change() -> None:
+    """Make numba recompile all kernels after a change in any file with kernels.
+
+    It compares only the date of the file that a kernel is in, but a kernel contains those that it
+    calls, also from other files.
+    """
+    from numba.core.caching import IndexDataCacheFile
+
+    begin = IndexDataCacheFile.__init__
+
+    def begin_with_all(self: Any, cache_path: str, filename_base: str, source_stamp: Any) -> None:
+        begin(self, cache_path, filename_base, (source_stamp, _digest_of_kernels()))
+
+    IndexDataCacheFile.__init__ = begin_with_all
+
+
+@functools.cache
+def _digest_of_kernels() -> str:
+    """A digest of all files with kernels."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
+        content = path.read_bytes()
+        if b"numerics.lanes" in content or path.name == "lanes.py":
+            digest.update(content)
+    return digest.hexdigest()
 
 
 def _usual_places() -> Iterator[Path]:

@@ -104,6 +104,13 @@ def test_kernels_kept_by_another_version_are_compiled_anew(tmp_path, monkeypatch
     assert kept.load("another") == "compiled anew"
 
 
+def test_kernels_are_compiled_anew_after_a_change_in_another_file(tmp_path, monkeypatch):
+    IndexDataCacheFile(str(tmp_path), "kernel", 1).save("types", "compiled")
+    assert IndexDataCacheFile(str(tmp_path), "kernel", 1).load("types") == "compiled"
+    monkeypatch.setattr(compiled, "_digest_of_kernels", lambda: "another")
+    assert IndexDataCacheFile(str(tmp_path), "kernel", 1).load("types") is None
+
+
 def test_the_bar_of_a_call_says_that_kernels_are_compiled(capsys):
     @cancelling.cancellable
     def work(*, progress=None, cancel=None):
