@@ -425,7 +425,7 @@ export function render({ model, view }) {
   view.model.data.player = player
   view.model.data.scene = player.scene // for code that finds the model by its name
   for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
-  const looks = ["most", "change", "colour", "thickness", "full", "stretch", "reference", "split", "scale", "tab", "views", "wide"]
+  const looks = ["most", "most_change", "colour", "thickness", "full", "stretch", "reference", "split", "scale", "tab", "views", "wide"]
   model.on(looks, () => player.again())
   model.on("tab", () => player.showRequested())
   const renew = () => { player.again(); player.mark() }

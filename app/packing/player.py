@@ -84,7 +84,7 @@ class Player(Scripted, Appearance):
     reduction = param.Array(default=None, doc="(N_c,) of ΔF_n in ⟨f_n⟩ by what is known, or None")
     measured = param.Dict(default={}, doc="of a frame, see legend.measured")
     most = param.Number(default=0.0, doc="ΔF_n in ⟨f_n⟩ at which its colour is full")
-    change = param.Number(doc="change of f_n in ⟨f_n⟩ at which its colour is full")
+    most_change = param.Number(doc="change of f_n in ⟨f_n⟩ at which its colour is full")
     pins = param.Dict(default={}, doc="contacts that are known, and to measure; see legend.pins")
     thrust = param.Dict(default={}, doc="where resultants at joints pass, see drawing/thrust.js")
     plane = param.Dict(default={}, doc="of force space on screen, see legend.projection")
@@ -254,7 +254,7 @@ class Player(Scripted, Appearance):
         if self._state.work.moving:
             self.legend = jamming(self._state)
             return
-        self.change = full_change(self._state)
+        self.most_change = full_change(self._state)
         self.legend = legend(self._state) + (THRUST if self.thrust else "")
 
 

@@ -691,7 +691,7 @@ def test_the_legend_says_what_colours_mean_in_the_hand(state):
         assert f'value="change" selected>change by the {by}</option>' in player.legend
     path = {"values": np.arange(2), "normal": np.repeat([1.0, 1.032], 50)}
     state.pushed = SimpleNamespace(path=path)
-    assert player.change == 0.03 and "≥ +0.03 ⟨fₙ⟩" in player.legend
+    assert player.most_change == 0.03 and "≥ +0.03 ⟨fₙ⟩" in player.legend
     state.looks.colour = "extent"
     assert '<option value="extent" selected' in player.legend  # and can still be chosen
     assert 'class="scale"' in player.legend

@@ -51,10 +51,10 @@ export class Look {
 
   /** The style of these forces, for the scene. */
   of(mixed) {
-    const { model, style } = this, { thickness, reference, most, palettes, full, change, stretch } = model
+    const { model, style } = this, { thickness, reference, most, palettes, full, most_change, stretch } = model
     const colour = this.before && model.colour === "change" ? "pulled" : model.colour
     // Reading the model is slow.
-    this.settings = { thickness, colour, pinned: reference * this.walk.contacts, most, full: change }
+    this.settings = { thickness, colour, pinned: reference * this.walk.contacts, most, full: most_change }
     this.settings.load = full ?? this.mostLoad
     const unit = this.walk.unit * this.scales.width * (stretch ?? 1)
     for (let c = 0; c < style.width.length; c++) {

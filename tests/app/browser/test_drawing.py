@@ -216,7 +216,7 @@ PRESSED = {
     "normal": [2.0, 2.0], "tangential": [0.0, 0.0], "low": [1.0, 2.0], "high": [4.0, 2.5],
 }  # fmt: skip
 MODEL = {
-    "scales": {"width": 0.1, "deviation": 4.0}, "change": 0.5, "thickness": "normal",
+    "scales": {"width": 0.1, "deviation": 4.0}, "most_change": 0.5, "thickness": "normal",
     "colour": "change", "reference": 0, "most": 3.0, "full": None, "stretch": 1.5,
     "palettes": {"change": list(range(11)), "mobilised": list(range(11)), "neutral": "grey"},
 }  # fmt: skip
