@@ -34,9 +34,9 @@ const PROGRAM = `<details><summary>A linear program, written out: the groove of 
 const SUMMARY = `<ul>
   <li><b>S</b>: all sets of forces that hold the same disks.</li>
   <li><b>Its dimension</b>: unknown forces minus equations.</li>
-  <li><b>Walk and bounds</b>: a random walk shows what is typical, a linear program what is possible.</li>
-  <li><b>Friction</b>: it widens S, but packings made with more of it have fewer contacts, so S has fewer dimensions.</li>
-  <li><b>Limit load and motion</b>: beyond the limit load S is empty; disks move before, when their own forces can follow no further along its edge.</li>
+  <li><b>Walk</b>: what is typical. <b>Linear program</b>: what is possible.</li>
+  <li><b>More friction</b>: first S is wider, then it loses dimensions.</li>
+  <li><b>Limit load</b>: S ends. Disks move before.</li>
 </ul>`
 
 /** The count of free numbers, line by line, with the sum in the last row. */
@@ -129,7 +129,7 @@ export const CHAPTERS = [
     name: "chance", title: "A random walk", heading: "How far does chance go?",
     text: ({ low, high, states }) => `By hand, the green force goes from ${two(low)} to ${two(high)}. Pale: all it can be together with a violet force, a shadow of S. Now chance walks through S in ${states} steps. Each changes all forces at random and then corrects them until all disks are in balance: a new network, one point of S.`,
     ask: "What is the largest green force that chance finds?",
-    doing: ({ step }) => `Press “Walk”, or drag the slider. Each dot is a network, one after every ${step} steps; network 0 is the one in which the packing came to rest.`,
+    doing: ({ step }) => `Press “Walk”, or drag the slider. Each dot is ${step > 1 ? `a network, one after about every ${step} steps` : "a step"}; network 0 is the one in which the packing came to rest.`,
     see: ({ part, share, free, between }) => [
       `${between ? "The largest value came between two of the dots. " : ""}The walk covers ${percent(part)} of what is possible for the green force. Its dots fill ${percent(share)} of the pale area, far from the edge: to get there, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
       `A walk shows what is typical, not what is possible. And this is only a shadow: a part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S.`,
@@ -160,17 +160,17 @@ export const CHAPTERS = [
   },
   {
     name: "push", title: "Why it matters", heading: "When does something move?",
-    text: ({ mu }) => `The packing of chapter 5 again, μ = ${mu}. The two disks of the marked line press on each other. Now they are pushed apart. The other forces change as little as they can, as they would if all contacts were very stiff springs, all alike.`,
+    text: ({ mu }) => `The packing of chapter 5, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, a little harder at each step, and all other forces give way just enough to balance the push.`,
     verdict: ({ limits: [first, ...others] }) => ({ answer: `It is ${two(first)}${others.length ? ` with the forces as packed, ${listed(others.map(two))} with others` : ""}.`, so: "" }),
     ask: "How hard can you push before a disk moves?",
     doing: () => "Drag the dot to the right, or an arrow away from the marked line.",
-    see: ({ high, limit, limits, number, opened, slid, carried, moving, pushed }) => [
-      moving ? `Now ${opened} contacts open (rings), ${slid} slip (dots), and disks start to move (black arrows, enlarged). Both disks of the pair move, one of them faster: the gap between them opens.`
+    see: ({ high, limit, limits, number, opened, slid, carried, moving, pushed, sinking }) => [
+      moving ? `Disks start to move (black arrows, enlarged); ${opened} contacts open (rings), ${slid} slip (dots). ${sinking ? "Though pushed up, the upper disk of the pair moves down, but the lower one faster" : "One disk of the pair moves faster"}: the gap opens.`
         : pushed ? `Without a push, the two disks press on each other with ${two(carried)}. At a push of ${two(high)}, disks start to move.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
-      `The small plot shows how S shrinks as the push grows, to one point at ${two(limit)}, the limit load. The packing gives way earlier: its own forces (line: that of the pair) reach the edge of S and can follow no further. Its history chose them. ${limits.length > 1
-        ? "No picture of the disks shows which push moves them. That is why it matters how undetermined forces are."
-        : "Would the same disks give way at the same push with other forces?"}`,
+      `Small plot: S shrinks to one point at ${two(limit)}, the limit load. Disks move earlier: forces (line: the pair’s) start where history put them and give way step by step, except where contacts open or slide. In the end no small change leads on, though other forces, which only a rebuilt packing would have, could still balance the push. ${limits.length > 1
+        ? "So no picture of the disks shows which push moves them: that is why undetermined forces matter."
+        : "Do other forces in S give way at the same push?"}`,
       SUMMARY,
     ],
     x: { low: 0, high: 2, label: "push (mean force = 1)" }, y: null,

@@ -26,7 +26,7 @@ export class Chance extends PackingExperiment {
     const { packing, contact, share } = this, { least, largest, low, high } = packing
     return {
       ...this.counted(packing), low: least[contact], high: largest[contact], share, states: packing.states,
-      step: this.drawn[2].number - this.drawn[1].number, between: high[contact] - Math.max(...this.drawn.map(([x]) => x)) > 0.005,
+      step: Math.round((packing.states - this.drawn[1].number) / (this.drawn.length - 2)), between: high[contact] - Math.max(...this.drawn.map(([x]) => x)) > 0.005,
       part: (high[contact] - low[contact]) / (largest[contact] - least[contact]),
     }
   }
@@ -50,7 +50,7 @@ export class Chance extends PackingExperiment {
   }
 
   get offer() {
-    return this.walking ? null : { words: this.answered ? "Walk again" : "Walk", run: () => this.walk(performance.now()) }
+    return this.walking ? null : { words: this.answered ? "Replay" : "Walk", run: () => this.walk(performance.now()) }
   }
 
   /** Play the walk, which began at this time. */

@@ -29,8 +29,8 @@ export class Push extends PackingExperiment {
 
   /** The next network, once disks moved from the present one. */
   get offer() {
-    const { start, path: { starts }, limits } = this
-    return limits.length > start && start + 1 < starts ? { words: "Take other forces in S", run: () => this.next() } : null
+    const { start, path: { starts }, pushed } = this
+    return pushed && start + 1 < starts ? { words: "Take other forces in S", run: () => this.next() } : null
   }
 
   async next() {
@@ -47,13 +47,17 @@ export class Push extends PackingExperiment {
   /** The largest push that the present forces carry. */
   get limit() { return this.path.values.at(-1) }
 
+  /** Whether the present forces have been pushed until disks moved. */
+  get pushed() { return this.limits.length > this.start }
+
   get moving() { return this.canvas.motion !== null }
 
   get facts() {
-    const { path: { limit, contact, opened, slid, number }, limits, start, moving, before } = this, count = (mask) => mask.reduce((sum, v) => sum + v, 0)
+    const { path: { limit, contact, opened, slid, number, displacement }, packing, limits, moving, before, pushed } = this, count = (mask) => mask.reduce((sum, v) => sum + v, 0)
+    const k = packing.contact.indexOf(contact), sinking = [packing.i[k], packing.j[k]].every((disk) => displacement[2 * disk + 1] < 0)
     return {
-      ...this.counted(this.packing), limit, number, moving, high: this.limit, carried: before[contact], opened: count(opened), slid: count(slid),
-      pushed: limits.length > start, limits: limits.map(({ value }) => value),
+      ...this.counted(packing), limit, number, moving, high: this.limit, carried: before[contact], opened: count(opened), slid: count(slid),
+      pushed, sinking, limits: limits.map(({ value }) => value),
     }
   }
 
@@ -89,13 +93,13 @@ export class Push extends PackingExperiment {
     return { now: [value, 0], seen: [[0, 0], [value, 0]], lines: answered ? [bound, ...limits.slice(1)] : [] }
   }
 
-  /** S on the force of the line, against the push, and the force of this network until disks move. */
+  /** S on the force of the line, against the push, and, once disks moved, the force of this network until then. */
   get aside() {
-    const { options, path: { values, normal, band, contact, limit }, packing: { contacts }, limit: most } = this
+    const { options, path: { values, normal, band, contact, limit }, packing: { contacts }, limit: most, pushed } = this
     const rows = Array.from({ length: band.length / 3 }, (_, k) => band.subarray(3 * k, 3 * k + 3)), edge = (d) => rows.map((row) => [row[0], row[d]])
     return {
-      axes: options, filled: true, walk: true, exact: [...edge(1), ...edge(2).reverse()], seen: Array.from(values, (push, k) => [push, normal[k * contacts + contact]]),
-      answer: { value: most, words: `disks move: ${most.toFixed(2)}` }, lines: [{ value: limit, words: `S ends: ${limit.toFixed(2)}` }],
+      axes: options, filled: true, walk: true, exact: [...edge(1), ...edge(2).reverse()], seen: pushed ? Array.from(values, (push, k) => [push, normal[k * contacts + contact]]) : [],
+      answer: pushed ? { value: most, words: `disks move: ${most.toFixed(2)}` } : null, lines: [{ value: limit, words: `S ends: ${limit.toFixed(2)}` }],
     }
   }
 
