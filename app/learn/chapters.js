@@ -21,8 +21,8 @@ const PRESSED = [
 /** Contacts at their limits against free numbers, in words; nothing if fewer forces are fixed than numbers were free. */
 function fixed(opened, sliding, bare, free) {
   const forces = 2 * opened + sliding, known = 3 * bare
-  const twice = known ? ` ${known} of them follow from the others, as a disk with no contact left is in balance anyway: ${forces} − ${known} = ${forces - known}.` : ""
-  return forces - known < free ? "" : ` That fixes 2 × ${opened} + ${sliding} = ${forces} forces.${twice} So none of the ${free} free numbers is left to change.`
+  const rest = known ? `${known} of them replace the equations of ${bare > 1 ? `${bare} disks` : "the disk"} left without contacts; the other ${forces - known}` : "They"
+  return forces - known < free ? "" : ` That fixes 2 × ${opened} + ${sliding} = ${forces} forces. ${rest} use up all ${free} free numbers.`
 }
 
 /** The largest force in a groove of two walls at 45° as a linear program, folded. */
@@ -66,7 +66,7 @@ export const CHAPTERS = [
     }),
     see: ({ low, high, smooth }) => [
       `At ${two(low)} the wall’s friction holds the ladder up as hard as it can; at ${two(high)} it pulls it down. Textbooks make the wall smooth and keep the floor rough: only ${two(smooth)} is left. (The slider changes both.)`,
-      "A real ladder does take one of these values. Which one depends on how it bends and was set up, and a rigid body knows neither. So we ask: what is possible? <b>All sets of forces that hold it are called S</b>, here the pale bar.",
+      "A real ladder does take one of these values. Which one depends on how it bends and was set up, and a rigid body knows neither. So we ask: what is possible? <b>All sets of forces that hold it are called S</b>, here the blue bar.",
     ],
     x: { low: 0, high: 0.6, label: "normal force at the wall (weight of the ladder = 1)" }, y: null,
     experiment: SceneExperiment, options: { scene: "ladder", x: 2, y: null, goal: "both" },
@@ -99,7 +99,7 @@ export const CHAPTERS = [
   },
   {
     name: "thirteen", title: "Thirteen disks", heading: "How strong can one contact get?",
-    text: ({ contacts, equations, free, disks, start, mu, mean }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations (counted later): S has ${free} dimensions. No screen can show them, so the plot has two of the forces as axes. The green one starts at ${two(start)}; the mean of all is ${two(mean)} (at pressure 1).`,
+    text: ({ contacts, equations, free, disks, start, mu, mean }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations (counted later): S has ${free} dimensions. No screen can show them, so the plot has two of the forces as axes. The green one starts at ${two(start)}; the mean of all is ${two(mean)}.`,
     ask: "How large can the green force become?",
     doing: () => "Drag the dot to the right as far as it goes, or drag an arrow. All disks stay in balance. Dark: a contact is about to slip (wedge) or to open (ring).",
     see: ({ low, high, free, others }) => [
@@ -119,11 +119,11 @@ export const CHAPTERS = [
     doing: () => "Drag the dot to the right, or the marked line upwards. Other lines follow: orange ones grow, blue ones shrink. Dots: about to slip; rings: about to open.",
     see: ({ high, opened, sliding, bare, changed, contacts, free }) => [
       `At ${two(high)}, ${opened} contacts have lost both their forces (rings), and friction is at its limit at ${sliding} (dots).${fixed(opened, sliding, bare, free)} ${changed} other forces have changed by more than a tenth of the mean force; a photograph would look the same.`,
-      `How is ${two(high)} found? Balance and limits are linear, so S has flat sides, and the largest value of a force is at a corner, as in the box of chapter 3 (small plot). Finding this corner is called a linear program. A computer does it for all ${2 * contacts} forces in well under a second.`,
+      `How is ${two(high)} found? Balance and limits are linear, so S has flat sides, and the largest value of a force is at a corner, as for the box of chapter 3 (small plot). Finding this corner is called a linear program. A computer does it for all ${2 * contacts} forces in well under a second.`,
       PROGRAM,
     ],
     x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: null,
-    experiment: Grab, options: { across: 2, up: 3, axes: { x: { low: 0, high: 5, label: "two disks in a box: normal force at the left wall" }, y: { low: -1, high: 1.5, label: "friction" } } },
+    experiment: Grab, options: { across: 4, up: 0, axes: { x: { low: 1, high: 4, label: "box of chapter 3: normal force at the floor" }, y: { low: 0, high: 5, label: "between the disks" } } },
   },
   {
     name: "chance", title: "A random walk", heading: "How far does chance go?",
@@ -139,14 +139,14 @@ export const CHAPTERS = [
   },
   {
     name: "friction", title: "Friction", heading: "Where are forces least determined?",
-    text: ({ all }) => `So far μ changed for the same disks. <b>Here each μ is a new packing</b> of ${all} disks. Its forces walk at random through S, all sets of forces that hold the disks. More friction lets each force lean further; but each contact pushes sideways too, so disks rest with three contacts each, where four are needed without friction.`,
+    text: ({ all }) => `So far μ changed for the same disks. <b>Here each μ is a new packing</b> of ${all} disks. Its forces walk through S, all sets of forces that hold it. More friction lets forces lean further, but fewer contacts suffice: with three each, N disks have 3N/2 contacts: 3N unknown forces, 3N equations.`,
     ask: "At which friction μ do the forces vary most?",
     doing: () => "Drag the dot along the whole axis, to both ends. Blue: how much the forces vary. Grey: how many numbers are free.",
     see: ({ rows }) => {
       const most = rows.reduce((one, other) => (other.spread > one.spread ? other : one)), first = rows[0], last = rows.at(-1)
       return [
-        `At μ = ${first.mu} many numbers are free, ${first.free}, but friction leaves each little room: forces vary by ${percent(first.spread)}. With more friction each has more room: ${percent(most.spread)} at μ = ${most.mu}.`,
-        `But the packing made at μ = ${last.mu} has ${two(touching(last))} contacts per disk, the one at μ = ${first.mu} ${two(touching(first))}: so numbers are lost, ${most.free} are free at μ = ${most.mu} and ${last.free} at μ = ${last.mu}. S first grows wider and then loses its dimensions. (Line: mean over many packings.)`,
+        `At μ = ${first.mu}, ${first.free} numbers are free, but with little room each: forces vary by ${percent(first.spread)}. More friction gives more: ${percent(most.spread)} at μ = ${most.mu}.`,
+        `But the packing made at μ = ${last.mu} has only ${two(touching(last))} contacts per disk; at μ = ${first.mu} it was ${two(touching(first))}. So numbers are lost: ${most.free} are free at μ = ${most.mu}, ${last.free} at μ = ${last.mu}. S first grows wider and then loses its dimensions.`,
       ]
     },
     live: true,
@@ -160,7 +160,7 @@ export const CHAPTERS = [
   },
   {
     name: "push", title: "Why it matters", heading: "When does something move?",
-    text: ({ mu }) => `The packing of chapter 5, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, a little harder at each step, and all other forces give way just enough to balance the push.`,
+    text: ({ mu }) => `The packing of chapter 5, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, step by step; all other forces give way just enough to balance the push.`,
     verdict: ({ limits: [first, ...others] }) => ({ answer: `It is ${two(first)}${others.length ? ` with the forces as packed, ${listed(others.map(two))} with others` : ""}.`, so: "" }),
     ask: "How hard can you push before a disk moves?",
     doing: () => "Drag the dot to the right, or an arrow away from the marked line.",
@@ -168,9 +168,9 @@ export const CHAPTERS = [
       moving ? `Disks start to move (black arrows, enlarged); ${opened} contacts open (rings), ${slid} slip (dots). ${sinking ? "Though pushed up, the upper disk of the pair moves down, but the lower one faster" : "One disk of the pair moves faster"}: the gap opens.`
         : pushed ? `Without a push, the two disks press on each other with ${two(carried)}. At a push of ${two(high)}, disks start to move.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
-      `Small plot: S shrinks to one point at ${two(limit)}, the limit load. Disks move earlier: forces (line: the pair’s) start where history put them and give way step by step, except where contacts open or slide. In the end no small change leads on, though other forces, which only a rebuilt packing would have, could still balance the push. ${limits.length > 1
-        ? "So no picture of the disks shows which push moves them: that is why undetermined forces matter."
-        : "Do other forces in S give way at the same push?"}`,
+      `S (small plot) shrinks to one point at ${two(limit)}, the limit load. Forces (line: the pair’s) start where history put them and give way step by step, but not where contacts open or slide, until no small change leads on. Disks move, though other forces, which only a rebuilt packing would have, could still balance. ${limits.length > 1
+        ? "So no picture of the disks shows which push moves them."
+        : "Would others give way at the same push?"}`,
       SUMMARY,
     ],
     x: { low: 0, high: 2, label: "push (mean force = 1)" }, y: null,

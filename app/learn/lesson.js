@@ -109,7 +109,7 @@ class Lesson {
     turn.append(move("◂ Back", -1), last ? "" : move("Next ▸", 1))
     row.append(turn)
     const { pathname } = window.location, { scene } = chapter.options
-    const onwards = last ? `<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with these disks</a>` : ""
+    const onwards = last ? `<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with this scene</a>` : ""
     const after = createElement("p", { className: "after", innerHTML: onwards })
     const foot = createElement("div", { className: "foot" }) // always in view, as it says what to do next
     foot.append(voice, row)

@@ -40,9 +40,10 @@ export function drawNames(arrows, F) {
   const [cx, cy] = arrows.px(scene.x[0], scene.x[1])
   const write = (x, y, lines, align) => {
     g.textAlign = align
+    const middle = Math.min(y, arrows.easel.high - 8.5 * lines.length - 2) // in the picture
     lines.forEach((line, k) => {
       g.fillStyle = k ? look.cold : look.ink
-      g.fillText(line, x, y + 17 * (k - (lines.length - 1) / 2))
+      g.fillText(line, x, middle + 17 * (k - (lines.length - 1) / 2))
     })
   }
   for (const { contact, at, inward, across } of arrows.ends()) {

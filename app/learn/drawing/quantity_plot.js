@@ -122,19 +122,19 @@ export class QuantityPlot {
 
   /**
    * state: {now: [x, y], words, marker: {value, words}, answer: {value, words}, seen, exact, dots}: seen and exact are
-   * lists of points, and so is dots; null hides a part. filled: they are areas; thin: curves; walk: only seen is a curve.
+   * lists of points, and so is dots; null hides a part. filled: they are areas; walk: only seen is a curve.
    * second: points of a second quantity. lines: [{value, words}], named values, the first one a bound on the others.
    */
   draw(state) {
     this.state = state
     if (!this.x) return
-    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], dots = [], second = [], filled = false, thin = false, walk = false, lines = [] } = state
+    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], dots = [], second = [], filled = false, walk = false, lines = [] } = state
     const path = (points, end = "") => (points.length ? `M${points.map((point) => this.place(point).map((v) => v.toFixed(1)).join()).join("L")}${end}` : "")
     for (const [part, points] of [[this.exact, exact], [this.seen, seen]]) {
       const area = filled && !(walk && points === seen)
       part.setAttribute("d", path(points, area && points.length > 2 ? "Z" : ""))
       part.classList.toggle("filled", area)
-      part.classList.toggle("thin", thin || area !== filled)
+      part.classList.toggle("thin", area !== filled)
     }
     this.further.setAttribute("d", this.beyond(exact))
     this.second.setAttribute("d", second.map(([x, y]) => `M${this.x.px(x)} ${this.right.px(y)}h0`).join(""))

@@ -1,7 +1,6 @@
 // The same number of disks packed with increasing friction: at every stop, the picture and the numbers are
 // those of one packing, which runs through its networks.
 
-import { unflat } from "../../browser/canvas_paths.js"
 import { STILL } from "../../browser/motion.js"
 import { PackingExperiment } from "./packing_experiment.js"
 
@@ -12,8 +11,8 @@ const nearest = (list, mu) => list.reduce((one, other) => (Math.abs(Math.log(oth
 
 export class Friction extends PackingExperiment {
   async load(source) {
-    const { mu, spread, free, means } = await source.get("curve")
-    Object.assign(this, { stops: [...mu], spreads: [...spread], free: [...free], means: unflat([...means]) ?? [], packings: new Map(), visited: new Set() })
+    const { mu, spread, free } = await source.get("curve")
+    Object.assign(this, { stops: [...mu], spreads: [...spread], free: [...free], packings: new Map(), visited: new Set() })
     this.value = nearest(this.stops, START)
     const fetched = this.stops.map((one) => source.get("packing", String(one)).then((packing) => this.packings.set(one, packing)))
     this.fetched = Promise.all(fetched)
@@ -67,11 +66,11 @@ export class Friction extends PackingExperiment {
   finish({ x }) { for (const to of [x.low, x.high, this.answer]) this.drag(to) }
 
   get picture() {
-    const { stops, spreads, free, value, visited, answered, means } = this, now = stops.indexOf(value), curve = stops.map((mu, k) => [mu, spreads[k]])
+    const { stops, spreads, free, value, visited } = this, now = stops.indexOf(value), curve = stops.map((mu, k) => [mu, spreads[k]])
     const been = ([mu]) => mu === value || visited.has(mu)
     return {
       now: curve[now], words: `μ = ${value}`, dots: curve.filter(been),
-      second: stops.map((mu, k) => [mu, free[k]]).filter(been), thin: true, exact: answered ? means : [],
+      second: stops.map((mu, k) => [mu, free[k]]).filter(been),
     }
   }
 

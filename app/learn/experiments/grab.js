@@ -110,6 +110,6 @@ export class Grab extends PackingExperiment {
   get aside() {
     const { axes, across, up } = this.options, outline = hull(this.box.corners.map(({ u }) => { const F = this.box.forces(u); return [F[across], F[up]] }))
     const most = Math.max(...outline.map(([x]) => x))
-    return { axes, exact: outline, filled: true, dots: outline.filter(([x]) => x === most), answer: { value: most, words: most.toFixed(2) } }
+    return { axes, exact: outline, filled: true, dots: outline.filter(([x]) => x > most - 1e-9), answer: { value: most, words: most.toFixed(2) } }
   }
 }

@@ -78,8 +78,8 @@ export class SceneExperiment {
 
   get turned() {
     const { body, scene: { one }, S: { bounds: [low, high] = [] } = {} } = this, value = body.mu, mu = `μ = ${Number(value.toFixed(2))}`
-    if (low === undefined) return { value, words: `${mu}: S is empty. No forces hold the ${one}${body.scene.r.length > 1 ? "s" : ""}: motion begins.` }
-    if (high === Infinity) return { value, words: `${mu}: S has no end. Forces lock between the walls, as large as you like (dashed: longer than drawn).` }
+    if (low === undefined) return { value, words: `${mu}: S is empty, no forces can hold the ${one}${body.scene.r.length > 1 ? "s" : ""}.` }
+    if (high === Infinity) return { value, words: `${mu}: S has no end, forces can be as large as you like.` }
     return { value, words: high - low < 1e-6 ? `${mu}: S is one point, ${low.toFixed(2)}. Nothing is left open.` : `${mu}: from ${low.toFixed(2)} to ${high.toFixed(2)}` }
   }
 

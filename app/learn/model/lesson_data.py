@@ -16,7 +16,7 @@ from granforce.types import Floats
 
 from ...packing.legend import exact_intervals
 from ...packing.player import frames
-from ...results import planes, study_data
+from ...results import planes
 from ...results.library import Cell, Library, Shown, best_cell
 from ...state.perturbations import path
 from ...state.pulls import rail_of
@@ -194,17 +194,12 @@ class Packings:
         return int(contacts[row]), float(limit[row])
 
     def curve(self) -> dict[str, Any]:
-        """Of the packing at each friction, the variation of forces and the free numbers.
-
-        means: friction and mean variation of forces over the packings of the study, flat.
-        """
-        frictions, means = self.frictions, study_data.against_friction("eta1")
-        summaries = [self.shown(mu).replay.summary for mu in frictions]
+        """Of the packing at each friction, the variation of forces and the free numbers."""
+        summaries = [self.shown(mu).replay.summary for mu in self.frictions]
         return {
-            "mu": frictions,
+            "mu": self.frictions,
             "spread": [one["eta1"] for one in summaries],
             "free": [one["dimension"] for one in summaries],
-            "means": np.ravel([one for one in means if frictions[0] <= one[0] <= frictions[-1]]),
         }
 
     def _pushed(self) -> xr.Dataset:

@@ -7,11 +7,8 @@ const plural = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`
 const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(Boolean).join(" and ")
 
 const BOTH = "at the left wall and at the right wall"
-// A disk between two walls cannot slide down both: friction is at its limit at both.
-const AT_BOTH = {
-  "about to slide up": "friction pushes the disk down\nas hard as it can",
-  "about to slide down": "friction pushes the disk up\nas hard as it can",
-}
+// A disk between two walls cannot slide down both, nor a ladder up one: friction is at its limit.
+const PUSHED = { "about to slide up": "down\nas hard as it can", "about to slide down": "up\nas hard as it can" }
 
 /** A force in words: 2 c for the normal one of contact c, 2 c + 1 for the tangential one. */
 export function forceName(scene, index) {
@@ -30,8 +27,8 @@ export function stopping({ scene }, side) {
     kinds.set(verb, [...(kinds.get(verb) ?? []), place])
   }
   return [...kinds].map(([verb, places]) => {
-    const where = places.join(" and ")
-    return where !== BOTH ? `${verb} ${where}` : AT_BOTH[verb] ?? `${verb} at both walls`
+    const where = places.join(" and "), both = where === BOTH, way = both || scene.one === "ladder" ? PUSHED[verb] : null
+    return way ? `friction${both ? "" : " at the wall"} pushes the ${scene.one} ${way}` : `${verb} ${both ? "at both walls" : where}`
   }).join(", ")
 }
 
@@ -148,7 +145,7 @@ function wedges(body) {
 
 /** Whether friction on a disk between two walls points down at both, as it can only there. */
 function gripped(body) {
-  const { scene } = body, F = body.forces(), between = body.sides.find((side) => stopping(body, side) === AT_BOTH["about to slide up"])
+  const { scene } = body, F = body.forces(), between = body.sides.find((side) => stopping(body, side).startsWith("friction pushes the disk down"))
   return between?.stops.every(([c]) => -F[2 * c + 1] * scene.normal[2 * c] < -1e-9)
 }
 

@@ -61,6 +61,13 @@ ARROW = """({ scene }) => {
 }"""
 
 
+# Whether the last line is above the row of buttons.
+CLEAR = """(article) => {
+    const [last, row] = [".voice > :last-child", ".row"].map((part) => article.querySelector(part))
+    return last.getBoundingClientRect().bottom <= row.getBoundingClientRect().top
+}"""
+
+
 def press(page, keys):
     """Press keys on the dot, once it can be dragged."""
     page.locator(".now.movable").wait_for()
@@ -70,7 +77,7 @@ def press(page, keys):
 
 
 def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
-    page, answers = opening("?learn", 1280, 900, at=lesson), {}
+    page, answers = opening("?learn", 1280, 800, at=lesson), {}
     for name, (heading, keys, answer) in CHAPTERS.items():
         page.get_by_role("heading", name=heading).wait_for()
         question = page.locator("article strong")
@@ -81,7 +88,7 @@ def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
         expect(page.get_by_role("button", name="That is my prediction")).to_be_disabled()
         predict(page)
         page.locator(".voice p").filter(has_text=re.compile("Drag the dot|Press “Walk”")).wait_for()
-        more = page.get_by_role("link", name="More with these disks")
+        more = page.get_by_role("link", name="More with this scene")
         expect(more.filter(visible=True)).to_have_count(0)
         (page.get_by_role("slider", name="walk") if name == "chance" else dot(page)).focus()
         for key in keys:
@@ -94,6 +101,7 @@ def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
         assert answer is None or f" {answer}." in told, name
         words = page.locator("article").inner_text()
         assert "You predicted" in told and COUNTS.get(name, "") in words
+        assert page.locator("article").evaluate(CLEAR), name
         answers[name] = re.search(r"It is (\d[\d.]*\d)\.|$", told)[1]
         assert "S, all sets of forces" in words or name in (*SCENES, "chance", "push"), name
         assert ("− 2" in words and "+ 1" in words) == (name == "thirteen"), name
@@ -179,7 +187,7 @@ def test_the_way_back_from_more_disks_leads_to_the_same_chapter(opening, lesson)
     assert page.locator("path.further").get_attribute("d")
     friction.fill("0.5")
     assert not page.locator("path.further").get_attribute("d")
-    page.get_by_role("link", name="More with these disks").click()
+    page.get_by_role("link", name="More with this scene").click()
     page.get_by_role("button", name="Random walk").wait_for()
     page.go_back()
     page.get_by_text("It is 1.41.").wait_for()
@@ -259,7 +267,10 @@ def test_the_same_disks_are_pushed_from_other_forces_and_every_limit_stays(openi
     other = page.get_by_role("button", name="Take other forces in S")
     expect(other).to_be_hidden()
     press(page, RIGHT)
-    page.get_by_text("disks start to move").wait_for()
+    page.get_by_text("Disks start to move").wait_for()
+    page.get_by_text("the lower one faster").wait_for()
+    stopped = page.locator(".aside").get_by_text("disks move: ")
+    expect(stopped).to_have_count(1)
     allowed = page.locator("figure").get_by_text("limit load")
     first = float(dot(page).get_attribute("aria-valuenow"))
     assert first < float(allowed.inner_html().split()[-1])
@@ -268,6 +279,7 @@ def test_the_same_disks_are_pushed_from_other_forces_and_every_limit_stays(openi
     other.click()
     page.get_by_text("Push again").wait_for()
     assert float(dot(page).get_attribute("aria-valuenow")) == 0
+    expect(stopped.filter(visible=True)).to_have_count(0)  # only after they moved
     # An arrow follows the hand.
     x, y, along = page.locator(".scene").evaluate(ARROW)
     page.mouse.move(x, y)
