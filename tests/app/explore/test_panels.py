@@ -723,6 +723,7 @@ def test_parameters_name_what_is_on_screen(state):
 def test_every_button_hands_a_file_over(state):
     view = export_view.View(state)
     keys = [key for group in view.buttons.files.values() for key in group]
+    keys.remove("motion")  # of a push
     for key in keys:
         handed = []
         view.buttons.tell = handed.append
@@ -738,6 +739,21 @@ def test_every_button_hands_a_file_over(state):
         lines = file.get("caption", {}).get("lines", [])
         assert ("Network as packed." in lines) == (key in ("svg", "png"))
     assert len(keys) == 9
+
+
+def test_the_motion_of_a_push_is_saved_once_there_is_one(state):
+    view, handed = export_view.View(state), []
+    view.buttons.tell = handed.append
+    view.buttons.hear({"key": "motion"})
+    wait_for(state, lambda: "push two disks apart" in state.work.message)
+    work = perturbations.push(state.library, state.cell, state.replay, 4)
+    state.looks.contact, state.pushed = 4, work(Job(lambda job: None))
+    view.buttons.hear({"key": "motion"})
+    wait_for(state, lambda: handed)
+    head, table = handed[0]["content"].decode().split("grain,")
+    assert f"contact {state.replay.backbone[4]}" in head
+    motion = np.array([row.split(",") for row in table.splitlines()[1:]], dtype=float)[:, -2:]
+    np.testing.assert_allclose(motion, state.pushed.displacement, rtol=1e-6)
 
 
 def test_the_table_has_the_bounds_under_what_is_held_and_says_so(state):

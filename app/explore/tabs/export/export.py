@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 import panel as pn
 import xarray as xr
 
+from granforce.records import InputError
+
 from ....background.jobs import Job, reading
 from ....packing.captions import caption, known_words, network, origin, shown_stem, stem
 from ....packing.legend import measured, pins, reduction
@@ -40,6 +42,9 @@ class Snapshot:
             *known_words(state, MOST_KNOWN), files.bounds_of(knowledge, state.obeying),
             f"This view: ?{self.link}",
         )  # fmt: skip
+        chosen = state.looks.contact
+        self.pushed = state.pushed
+        self.contact = self.replay.invited if chosen is None else chosen
         numbers = state.numbers
         self._numbered = self.view if numbers is None else numbers.of(self.view)
         self._shown: dict[str, Any] = {
@@ -55,6 +60,15 @@ class Snapshot:
     def csv(self, job: Job) -> File:
         """A table of the contacts."""
         return self.file("csv", "text/csv", csv(self._columns, self._head))
+
+    def motion(self, job: Job) -> File:
+        """A table of the first motion of the disks under the push."""
+        if self.pushed is None or self.contact is None:
+            raise InputError("nothing was pushed: push two disks apart in the Push tab first")
+        packing = self.library.packing(self.cell.params["packing"])
+        columns, head = files.motion(packing, self.pushed, int(self.replay.backbone[self.contact]))
+        head += f"# {self.source}\n# This packing: ?{self.link}\n"
+        return self.file("motion.csv", "text/csv", csv(columns, head))
 
     def json(self, job: Job) -> File:
         """Parameters, link, command and view."""
@@ -106,6 +120,7 @@ GROUPS = {
     "Share with others": {"html": Kind("This view as a page (HTML)", Snapshot.html, True)},
     "Data on screen": {
         "csv": Kind("Contacts (CSV)", Snapshot.csv),
+        "motion": Kind("Motion by the push (CSV)", Snapshot.motion),
         "netcdf": Kind("Networks (NetCDF)", Snapshot.netcdf, True),
         "zarr": Kind("Networks (Zarr, zipped)", Snapshot.zarr, True),
     },
@@ -120,8 +135,8 @@ FILES = {
 }
 KINDS = {key: kind for group in GROUPS.values() for key, kind in group.items()}
 HELP = """
-Each file shows the current view, including pulled and held forces but not a push, which ends with
-its tab; playing pauses. Pictures have a
+Each file shows the current view, including pulled and held forces; a push ends with its tab, but
+the motion that it caused can be saved here. Playing pauses. Pictures have a
 colour bar, scales and a caption. The movie plays from the first network to the last, or back and
 forth between two, at the player's speed. The HTML page needs no server and no network connection.
 Contacts: one row each, with disks, forces as packed and on screen, the range over the networks and,

@@ -20,6 +20,7 @@ from ....results.replays import Replay, worded
 from ....results.saved_file import Columns
 from ....results.selection import command
 from ....state.known import Knowledge
+from ....state.perturbations import Pushed
 from ....state.pulls import Held
 
 # The contact dimension of a packing's own arrays; that of the states contains only the backbone.
@@ -146,6 +147,21 @@ def explained(columns: Iterable[str], replay: Replay, *titles: str) -> str:
     meanings = (f"{name}: {worded(replay, _meaning(name))}" for name in columns)
     lines = [*filter(None, titles), unit, ETA3, *meanings]
     return "".join(f"# {line}\n" for line in lines)
+
+
+def motion(packing: Packing, pushed: Pushed, contact: int) -> tuple[Columns, str]:
+    """Columns with the first motion of each grain under a push on a contact, and their head."""
+    columns = {"grain": np.arange(len(packing.r)), "r": packing.r}
+    columns |= dict(zip(("x", "y"), packing.x.T, strict=True))
+    columns |= dict(zip(("u_x", "u_y"), pushed.displacement.T, strict=True))
+    lines = (
+        f"first motion when the disks of contact {contact} are pushed apart, in any unit: its root "
+        "mean square over the disks of the backbone is 1; others have 0",
+        f"F_crit between {pushed.low:.9g} and {pushed.high:.9g}, limit load {pushed.limit:.9g}, in "
+        "mean normal forces",
+        f"contacts that open: {pushed.opened}, slide: {pushed.slid}, stick: {pushed.kept}",
+    )
+    return columns, "".join(f"# {line}\n" for line in lines)
 
 
 def dataset(packing: Packing, states: xr.Dataset, exact: xr.Dataset | None = None) -> xr.Dataset:
