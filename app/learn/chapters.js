@@ -164,12 +164,12 @@ export const CHAPTERS = [
     verdict: ({ limits: [first, ...others] }) => ({ answer: `It is ${two(first)}${others.length ? ` with the forces as packed, ${listed(others.map(two))} with others` : ""}.`, so: "" }),
     ask: "How hard can you push before a disk moves?",
     doing: () => "Drag the dot to the right, or an arrow away from the marked line.",
-    see: ({ high, limit, limits, number, opened, slid, carried, moving, pushed, sinking }) => [
-      moving ? `Disks start to move (black arrows, enlarged); ${opened} contacts open (rings), ${slid} slip (dots). ${sinking ? "Though pushed up, the upper disk of the pair moves down, but the lower one faster" : "One disk of the pair moves faster"}: the gap opens.`
+    see: ({ high, limits, number, opened, slid, carried, moving, pushed, sinking }) => [
+      moving ? `Disks start to move (arrows): ${opened} contacts open (rings), ${slid} slip (dots). ${sinking ? "The upper disk, pushed up, sinks, but the lower one faster" : "The gap in the pair opens"}.`
         : pushed ? `Without a push, the two disks press on each other with ${two(carried)}. At a push of ${two(high)}, disks start to move.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
-      `S (small plot) shrinks to one point at ${two(limit)}, the limit load. Forces (line: the pair’s) start where history put them and give way step by step, but not where contacts open or slide, until no small change leads on. Disks move, though other forces, which only a rebuilt packing would have, could still balance. ${limits.length > 1
-        ? "So no picture of the disks shows which push moves them."
+      `S (small plot) shrinks to a point at the limit load. Forces (line; at 0 the pair opens) start where history put them and give way step by step, but not where contacts open or slide, until no small change leads on. Disks move, though other forces, which only a rebuilt packing has, could still balance. ${limits.length > 1
+        ? "No picture shows which push moves disks."
         : "Would others give way at the same push?"}`,
       SUMMARY,
     ],

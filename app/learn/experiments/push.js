@@ -53,10 +53,10 @@ export class Push extends PackingExperiment {
   get moving() { return this.canvas.motion !== null }
 
   get facts() {
-    const { path: { limit, contact, opened, slid, number, displacement }, packing, limits, moving, before, pushed } = this, count = (mask) => mask.reduce((sum, v) => sum + v, 0)
+    const { path: { contact, opened, slid, number, displacement }, packing, limits, moving, before, pushed } = this, count = (mask) => mask.reduce((sum, v) => sum + v, 0)
     const k = packing.contact.indexOf(contact), sinking = [packing.i[k], packing.j[k]].every((disk) => displacement[2 * disk + 1] < 0)
     return {
-      ...this.counted(packing), limit, number, moving, high: this.limit, carried: before[contact], opened: count(opened), slid: count(slid),
+      ...this.counted(packing), number, moving, high: this.limit, carried: before[contact], opened: count(opened), slid: count(slid),
       pushed, sinking, limits: limits.map(({ value }) => value),
     }
   }
