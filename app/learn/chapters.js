@@ -168,7 +168,7 @@ export const CHAPTERS = [
       moving ? `Disks start to move (arrows): ${opened} contacts open (rings), ${slid} slip (dots). ${sinking ? "The upper disk, pushed up, sinks, but the lower one faster" : "The gap in the pair opens"}.`
         : pushed ? `Without a push, the two disks press on each other with ${two(carried)}. At a push of ${two(high)}, disks start to move.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
-      `S (small plot) shrinks to a point at the limit load. Forces (line; at 0 the pair opens) start where history put them and give way step by step, but not where contacts open or slide, until no small change leads on. Disks move, though other forces, which only a rebuilt packing has, could still balance. ${limits.length > 1
+      `S (small plot) shrinks to a point at the limit load. The forces (line; at 0 the pair opens) start where history put them and give way step by step. In the end no small change can balance the push: disks move. Other forces could, but only a rebuilt packing has them. ${limits.length > 1
         ? "No picture shows which push moves disks."
         : "Would others give way at the same push?"}`,
       SUMMARY,
