@@ -325,7 +325,7 @@ def _outdated_parts(rows: pd.DataFrame, planned: pd.DataFrame, replaced: pd.Seri
     for k, row in differ[~differ["part"].isin(replaced)][:1].iterrows():
         raise InputError(
             f"the older table has {row['part']} {_version_words(row)}, which cannot be combined "
-            f"with {_version_words(wanted.loc[k])}: compute that part, or leave --table out"
+            f"with those {_version_words(wanted.loc[k])}: compute that part, or leave --table out"
         )
     return set(differ["part"])
 
