@@ -161,7 +161,9 @@ def test_seeds_have_defaults_as_on_the_command_line():
         if inspect.isfunction(function := getattr(gf, name))
         and "seed" in (parameters := inspect.signature(function).parameters)
     }
-    assert defaults.pop("pack") == 1 and set(defaults.values()) == {0}
+    assert defaults.pop("pack") == 1
+    assert defaults.pop("show") is None  # of the walk that it is given, and refused without one
+    assert set(defaults.values()) == {0}
 
 
 def test_a_mistyped_store_leaves_nothing(tmp_path):

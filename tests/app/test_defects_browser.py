@@ -390,5 +390,5 @@ def test_the_line_of_results_opens_tables_at_the_height_of_a_laptop(visit):
     results = page.get_by_role("region", name="Results")
     note = results.get_by_text("Not counted:")
     expect(note).to_be_hidden()
-    results.get_by_role("button", name="all numbers").click()
+    results.get_by_role("button", name="tables").click()
     expect(note).to_be_visible()

@@ -3,7 +3,7 @@
 import inspect
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,8 +30,7 @@ from granforce.study.store import Store, open_store
 from granforce.system.cancelling import answering, called
 
 
-@contextmanager
-def cached(path: str | Path | None = None) -> Iterator[Store]:
+def cached(path: str | Path | None = None) -> AbstractContextManager[Store]:
     """A context in which results are loaded from a store, or computed and saved there.
 
     The command line and this context find what the other saved. `pack`, `walk`, `sample_uniform`,
@@ -48,8 +47,8 @@ def cached(path: str | Path | None = None) -> Iterator[Store]:
 
     Returns
     -------
-    Store
-        The store, as the value of the context.
+    context manager
+        Its value is the Store.
 
     Raises
     ------
@@ -58,15 +57,14 @@ def cached(path: str | Path | None = None) -> Iterator[Store]:
     """
     store = open_store(path)
     store.make()
-    with _answering(partial(_answer, store)):
-        yield store
+    return _answering(partial(_answer, store), store)
 
 
 @contextmanager
-def _answering(answer: Callable[..., Any]) -> Iterator[None]:
+def _answering(answer: Callable[..., Any], store: Store) -> Iterator[Store]:
     token = answering.set(answer)
     try:
-        yield
+        yield store
     finally:
         answering.reset(token)
 
@@ -123,7 +121,7 @@ def _answer(store: Store, function: Callable[..., Any], *arguments: Any, **optio
     S = options.get("ensemble", *arguments[:1]) if "packing" in named else None
     if dataset is None:
         passed = ("workers", "progress", *answer.unnamed)
-        with _answering(called):  # what it calls has keys of other ensembles
+        with _answering(called, store):  # what it calls has keys of other ensembles
             if S is not None:
                 kinds.keep_packing(store, named["packing"], S.packing)
                 kinds.remember(store, named, S)
