@@ -41,6 +41,14 @@ from granforce.tolerances import INTERVAL_GAP
 HELD_VARIABLE = "GRANFORCE_HELD"
 PATIENCE = 60.0  # s until the server must respond
 PAUSE = 0.1  # s between attempts
+# The "bad ports" of the Fetch standard.
+BLOCKED = {
+    1, 7, 9, 11, 13, 15, 17, 19, 20, 21, 22, 23, 25, 37, 42, 43, 53, 69, 77, 79, 87, 95, 101, 102,
+    103, 104, 109, 110, 111, 113, 115, 117, 119, 123, 135, 137, 139, 143, 161, 179, 389, 427, 465,
+    512, 513, 514, 515, 526, 530, 531, 532, 540, 548, 554, 556, 563, 587, 601, 636, 989, 990, 993,
+    995, 1719, 1720, 1723, 2049, 3659, 4045, 4190, 5060, 5061, 6000, 6566, 6665, 6666, 6667, 6668,
+    6669, 6679, 6697, 10080,
+}  # fmt: skip
 _RESULTS = Intervals | Walk  # of an Ensemble, which `show` takes
 ENDED = "the server of this page has ended: gf.show opens a new page"
 
@@ -195,6 +203,8 @@ def checked_port(address: str, port: int) -> int:
     """The port, a free one for 0; InputError if the address cannot be used, or is in use."""
     if not address.strip():
         raise InputError("--address is empty; give a host name or an IP address, such as localhost")
+    if port in BLOCKED:
+        raise InputError(f"browsers open no page at port {port}; choose another with --port")
     try:
         family, kind, _, _, place = socket.getaddrinfo(address, port, type=socket.SOCK_STREAM)[0]
         with socket.socket(family, kind) as probe:

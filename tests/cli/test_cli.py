@@ -601,6 +601,13 @@ def test_too_many_open_files_are_told_in_a_line(run, monkeypatch):
     assert (code, out, err.count("\n")) == (2, "", 1) and "too many open files; use fewer" in err
 
 
+@pytest.mark.parametrize("port", ["5060", "6000", "10080"])
+def test_a_port_that_browsers_refuse_is_refused_in_a_line(port, capsys):
+    assert main(["app", "--no-show", "--port", port]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and f"browsers open no page at port {port}" in err
+
+
 def test_a_login_needs_a_secret_that_signs_its_cookies(away, capsys, monkeypatch):
     (away / "users.json").write_text('{"ann": "x"}')
     monkeypatch.delenv("PANEL_COOKIE_SECRET", raising=False)
