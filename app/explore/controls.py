@@ -11,8 +11,7 @@ from ..background.jobs import reading
 from ..background.limits import LIMITS, MOST_SEED
 from ..background.notifications import observe
 from ..results import study_data
-from ..results.library import SOURCES
-from ..results.selection import KINDS, SOLVERS, Selection, differing, select, typed, unusual
+from ..results.selection import SOLVERS, Selection, differing, select, typed, unusual
 from ..state.app_state import AppState
 from ..widgets.copy_button import CopyButton
 from ..widgets.disclosure import Disclosure
@@ -77,8 +76,6 @@ class Controls:
             label="Friction during packing", value=SAME, size="small", **FIELD | {"width": 180}
         )
         self.states = self._number("Networks", 1, LIMITS.states, 100)
-        kinds = {name: label for name, label in KINDS.items() if name in SOURCES}
-        self.kind = Select(label="Networks from", options=by_words(kinds), **LIST)
         self.relax = Select(label="Relaxation", options=by_words(SOLVERS), **LIST)
         self.series = Select(
             label="Precomputed results", margin=FIELD["margin"], max_width=580,
@@ -94,8 +91,8 @@ class Controls:
             align_items="center", css_classes=["controls-line"], sizing_mode="stretch_width",
         )  # fmt: skip
         self.options = pn.FlexBox(
-            self.n, self.seed, self.packed, self.states, self.kind, self.relax, self.series,
-            self.command, align_items="center", margin=0, visible=False, css_classes=["made"],
+            self.n, self.seed, self.packed, self.states, self.relax, self.series, self.command,
+            align_items="center", margin=0, visible=False, css_classes=["made"],
             sizing_mode="stretch_width",
         )  # fmt: skip
         self.opens.link(self.options, open="visible")
@@ -107,7 +104,7 @@ class Controls:
     def _connect(self) -> None:
         state = self.state
         self.mu.param.watch(lambda event: self._ask(), "mu")
-        for widget in (self.n, self.seed, self.packed, self.states, self.kind, self.relax):
+        for widget in (self.n, self.seed, self.packed, self.states, self.relax):
             widget.param.watch(lambda event: self._ask(), "value")
         self.series.param.watch(self._choose, "value")
         self.go.on_click(lambda event: state.compute())
@@ -140,7 +137,7 @@ class Controls:
         packing_mu = self.packed.value.strip()
         packed_mu = None if packing_mu in ("", SAME) else friction(typed(packing_mu))
         details = {
-            "kind": self.kind.value, "relax": self.relax.value, "states": self.states.value,
+            "kind": now.kind, "relax": self.relax.value, "states": self.states.value,
             "seed": now.seed,
         }  # fmt: skip
         if now.imported:
@@ -180,7 +177,7 @@ class Controls:
         self.seed.visible = self.packed.visible = not selection.imported
         self.packed.value = SAME if selection.same_mu else f"{packing['mu']:g}"
         self.states.value = selection.states
-        self.kind.value, self.relax.value = selection.kind, selection.relax
+        self.relax.value = selection.relax
         self.relax.visible = selection.kind == "walk"
         self.series.param.update(**offered(state))
         self._following = False

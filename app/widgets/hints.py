@@ -16,7 +16,6 @@ LABELS = {
     "Seed": "seed",
     "Networks": "states",
     "Friction during packing": "packed_mu",
-    "Networks from": "s",
     "Relaxation": "nearest",
     "Precomputed results": "store",
     "network as packed": "original",

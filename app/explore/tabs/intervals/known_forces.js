@@ -1,4 +1,4 @@
-// Known forces as chips, their effect in words, and the contact most worth measuring.
+// Known forces as chips, their effect in words, the sampler, and the contact most worth measuring.
 
 import { ask } from "../../../browser/send.js"
 import { button, createElement } from "../../../browser/dom.js"
@@ -8,8 +8,9 @@ export function render({ model, view }) {
   root.className = "known"
   root.innerHTML = `
     <div class="chips"></div><div class="words" role="status"></div>
+    <label data-term="s">Networks from <select></select></label>
     <button type="button" class="soft next">Which force to measure next?</button><p class="meaning"></p><ol class="ranked"></ol>`
-  const [chips, words, next, meaning, ranked] = root.children
+  const [chips, words, label, next, meaning, ranked] = root.children, select = label.lastElementChild
   const tell = (message) => ask(model, view, message)
 
   /** Mark a contact in the packing; null: the selected one. */
@@ -37,7 +38,10 @@ export function render({ model, view }) {
     meaning: () => { meaning.textContent = model.meaning },
     ranked: () => ranked.replaceChildren(...model.ranked.map(row)),
     asking: () => { next.disabled = model.asking },
+    samplers: () => select.replaceChildren(...model.samplers.map(([value, textContent]) => createElement("option", { value, textContent }))),
+    sampler: () => { select.value = model.sampler },
   }
+  select.addEventListener("change", () => tell({ sampler: select.value }))
   next.addEventListener("click", () => tell({ next: true }))
   words.addEventListener("click", ({ target: { dataset } }) => {
     if (dataset.contact) tell({ choose: Number(dataset.contact) })

@@ -10,6 +10,7 @@ from granforce.types import Integers
 from ....background.notifications import observe
 from ....browser.bundle import Scripted
 from ....browser.messages import forward, from_browser
+from ....results.selection import KINDS
 from ....state.app_state import AppState
 from ....state.known import Knowledge, Ranked
 from ....widgets.hints import term
@@ -17,7 +18,7 @@ from ....widgets.hints import term
 STRONGEST = 5  # number of contacts listed whose interval has shrunk most
 LINK = '<button type="button" class="found" data-contact="{}">{}</button>'
 SAMPLE = '<button type="button" class="found" data-sample>Sample networks</button>'
-ASK = "Hold a force (H), as if measured: other intervals shrink."
+ASK = "Hold a force (H): other intervals shrink."
 
 
 class Known(Scripted):
@@ -28,11 +29,13 @@ class Known(Scripted):
     ranked = param.List(doc="pairs (contact, words), the best to measure first")
     meaning = param.String(doc="of the numbers in `ranked`")
     asking = param.Boolean(doc="whether the best contacts to measure are being computed")
+    samplers = param.List(default=[*map(list, KINDS.items())], doc="pairs (name, words)")
+    sampler = param.String(doc="of the networks, one of `samplers`")
 
     def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(sizing_mode="stretch_width", margin=0, visible=False, **params)
         self._state = state
-        observe(self._show, state, "shown", "replay")
+        observe(self._show, state, "shown", "replay", "selection")
         observe(
             self._show, state.knowledge, "known", "narrowed", "ranked", "task.running",
             "ranking.words",
@@ -48,6 +51,13 @@ class Known(Scripted):
         if choose in self._state.contacts:
             self._state.looks.contact = choose
 
+    @from_browser(sampler=str)
+    def _sample_by(self, sampler: str) -> None:
+        state = self._state
+        if sampler in KINDS and state.selection is not None:
+            requested = state.selection._replace(kind=sampler)
+            state.ask(state.given_held(requested), at_once=True)
+
     def _show(self, *events: Any) -> None:
         state = self._state
         if state.replay is None:
@@ -61,6 +71,7 @@ class Known(Scripted):
             ranked=[] if best is None else _ranks(best, number),
             meaning=meaning(best, knowledge.ranking.words),
             asking=knowledge.ranking.running,
+            sampler=state.selection.kind,
         )
 
 
