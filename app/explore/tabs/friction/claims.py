@@ -40,11 +40,9 @@ def summary() -> str:
     """How to read the tables."""
     marks = ", ".join(f"{mark} {words}" for words, mark in list(SYMBOLS.items())[:-1])
     return (
-        f"<b>What became of the claims of {PAPER}, and of the letter before it?</b> Below each "
-        f"claim: the number that is judged, and its range for {marks}. A claim is reproduced if "
-        "the 95 % interval of each case is in the range, and contradicted if one is outside. The "
-        "figures above are drawn from nearest-network walks; claims are judged by what is named "
-        f"below each, mostly {SAMPLERS['gauss_seidel']}."
+        f"<b>Claims of {PAPER}</b>, by 95 % intervals: {marks}. Figures are drawn from "
+        "nearest-network walks; claims are judged by what is named below each, mostly "
+        f"{SAMPLERS['gauss_seidel']}."
     )
 
 

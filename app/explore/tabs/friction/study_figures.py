@@ -65,12 +65,12 @@ class Indeterminacy:
             return "The finished study is not part of this installation."
         z = statistics.means(walks, "coordination")
         return (
-            f"<b>Maxima in nearest-network walks: {_maxima(self.lines)}.</b> "
+            f"<b>Maxima in nearest-network walks: {_maxima(self.lines)}.</b> Click a point to open "
+            "such a packing.<details><summary>Why a maximum?</summary>"
             "Friction widens the range of forces at each contact, but packings made with more "
             f"friction have fewer contacts: z falls from {z[0][1]:.2f} to {z[-1][1]:.2f} (inset). "
             f"{_in_the_paper()}Points: means over {packings_at_each(walks)} packings of 400 "
-            "disks, with standard errors; open symbols: the packing on screen. Click a point to "
-            "open or compute such a packing."
+            "disks, with standard errors.</details>"
         )
 
 

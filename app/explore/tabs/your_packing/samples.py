@@ -12,9 +12,9 @@ from granforce.records import Packing
 
 from ....results.saved_file import File
 
-# A heap on a floor, for which friction 0.3 is too small, and a block on another.
+# A heap on a floor, which friction 0.3 holds, and a block on another.
 TABLES = {
-    "disks": "x,y,r\n1,1,1\n3,1,1\n5,1,1\n2,2.7320508,1\n4,2.7320508,1\n3,4.4641016,1\n",
+    "disks": "x,y,r\n1,1,1\n3,1,1\n5,1,1\n2,2.7320508,1\n4,2.7320508,1\n",
     "bodies": "body,x,y,fixed\n1,0,0,0\n1,1,0,0\n1,0,1,0\n2,-1,-1,1\n2,2,-1,1\n2,2,0,1\n2,-1,0,1\n",
 }
 WRITTEN: dict[str, tuple[tuple[str, str], Callable[[Packing, Path, Path], None]]] = {

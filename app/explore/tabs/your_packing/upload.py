@@ -27,30 +27,19 @@ from .my_computations import Mine
 
 STATES = 200  # of the first walk
 SAMPLES = {
-    "disks": "Table of disks (friction: 0.5, walls: a floor, gravity: 1)",
+    "disks": "Table of disks (walls: a floor, gravity: 1)",
     "bodies": "Table of bodies",
     "lammps": "LAMMPS: two dumps",
     "photoelastic": "Photoelastic frame: two lists",
 }
 HELP = """
-<b>NPZ</b> as written by <code>granforce pack --out</code> or <code>granforce import --out</code>;
-<b>LAMMPS</b>: a <code>dump custom</code> of the particles and a <code>dump local</code> of the
-contacts; <b>tables</b> (CSV): disks with columns x, y, r and, optionally, contacts with columns i,
-j and f_n, f_t; <b>bodies</b> (CSV or JSON): convex polygons and disks, with columns body, x, y, as
-for <code>granforce import blocks</code>; <b>photoelastic frames</b>, as PeGS writes them: positions
-(frame, id, x, y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a
-<code>_solved.mat</code> of PeGS 2, for which the nearest balanced forces are computed. Positions
-with a line of headers may have a column G2 or pressure: with its calibration a, b, σ, each disk has
-a measured pressure a G² + b ± σ, too. Something must hold the disks of a table: enter a periodic
-box, or walls and gravity, or give columns fx, fy, torque with the load on each disk. Tolerance is
-the largest gap of a contact: in largest radii (default 10⁻⁶), or, of bodies, in the unit of the
-file (default 10⁻⁹ of the largest body). Files are read into memory. A packing is saved in the
-cache; a frame is saved only if you open it as a packing.
+<b>NPZ</b> of <code>granforce pack</code> or <code>import</code>; <b>LAMMPS</b>: a particle and a
+contact dump; <b>tables</b> (CSV): x, y, r and, if known, i, j, f_n, f_t; <b>bodies</b> (CSV, JSON):
+body, x, y; <b>photoelastic frames</b>: both lists of PeGS, or its <code>_solved.mat</code>.
 """
 HOLD_WANTED = (
-    "What holds the disks? Enter the sides of a periodic box in Box, such as 30, 30, and its tilt, "
-    "if any; or choose Walls and enter Gravity, such as 1. Then press Read. Disks without either "
-    "need columns fx, fy, torque with the load on each."
+    "What holds the disks? Enter the sides of a periodic box, such as 30, 30, or choose Walls and "
+    "enter Gravity, such as 1; then press Read. Other loads need columns fx, fy, torque."
 )
 IDLE_PRESSURE = (
     "Pressure applies only to a table in a periodic box, without forces and loads: leave it empty"
