@@ -100,7 +100,7 @@ def _goes_as(job: Job, other: Job | None) -> None:
     job.stage = "already under way"
     if other is not None:
         job.stage += f": {other.stage}"
-        job.fraction, job._left = other.fraction, other.seconds_left
+        job.fraction, job._left, job._longest = other.fraction, other.seconds_left, other._longest
 
 
 class Visitor(NamedTuple):
@@ -238,6 +238,7 @@ class Job:
         self._until = math.inf  # when it is ended
         self.fraction: float | None = None  # done, 0 … 1; None if unknown
         self._left: float | None = None  # s of this stage, by its progress
+        self._longest = False
         self._expected = math.inf  # its end, as time.perf_counter, before there is progress
         self.error = ""
         self.so_far: Any = None  # its partial result, if the work provides one
@@ -267,14 +268,16 @@ class Job:
     def words(self) -> str:
         """Its current step and, if it can be estimated, the time left, in words."""
         left = self.seconds_left
-        return self.doing + ("" if left is None else f" — about {_duration(left)} more")
+        about = "up to" if self._longest else "about"
+        return self.doing + ("" if left is None else f" — {about} {_duration(left)} more")
 
-    def begin(self, stage: str, expected: float = math.inf) -> None:
+    def begin(self, stage: str, expected: float = math.inf, longest: bool = False) -> None:
         """Enter a stage, whose bar and remaining time start anew.
 
-        expected: its duration, s, to be said until its progress gives a better estimate.
+        expected: its duration, s, to be said until its progress gives a better estimate; longest:
+        whether most take less, so that it is a limit.
         """
-        self.stage, self._counted = stage, None
+        self.stage, self._counted, self._longest = stage, None, longest
         self.fraction = self._left = None
         self._expected = time.perf_counter() + expected
 
