@@ -15,7 +15,7 @@ from granforce.measures.sampling import FEWEST, MIXED
 from ..results.library import Shown
 from ..results.progress_feed import Summary
 from ..results.replays import Replay, worded
-from ..results.selection import SOLVERS, Selection
+from ..results.selection import SOLVERS, Selection, differing
 from ..state.app_state import AppState
 from ..widgets.hints import term
 
@@ -53,7 +53,7 @@ def measures(state: AppState) -> list[Quantity]:
     replay = state.replay
     if replay is None:
         return []
-    summary, worth, possible = replay.summary, replay.sampling, state.possible
+    summary, worth, possible = replay.summary, replay.sampling, state.settled
     extent = float((replay.high - replay.low)[:, 0].mean()) if len(replay.low) else math.nan
     return [
         Quantity("eta1", "η₁", "spread", with_error(summary["eta1"], worth.eta1_error)),
@@ -102,11 +102,20 @@ def unbounded(summary: Summary) -> bool:
     return math.isnan(summary.get("eta1", 0.0))
 
 
-def changes(*compared: Shown) -> str:
-    """μ, η, z, φ and h as HTML; those of several packings as "old → new"."""
-    exact = all(shown.exact is not None for shown in compared)
-    columns = [_compared(shown, exact) for shown in compared]
-    values = {name: " → ".join(one[name] for one in columns) for name in columns[0]}
+def changes(now: Shown, was: Shown | None = None) -> str:
+    """μ, η, z, φ and h as HTML; with earlier states what has changed, as "old → new"."""
+    if was is None:
+        return _listed(_compared(now, now.exact is not None))
+    new, old = now.cell.selection, was.cell.selection
+    # Of the same packing, exact bounds stay as they were: only the networks have changed.
+    exact = not (now.exact is None or was.exact is None or new.shares_packing(old))
+    before, after = _compared(was, exact), _compared(now, exact)
+    values = {name: f"{before[name]} → {one}" for name, one in after.items() if before[name] != one}
+    words = "" if new.mu != old.mu or new.imported else f"{differing(new, old)}: "
+    return words * bool(values) + _listed(values)
+
+
+def _listed(values: dict[str, str]) -> str:
     return ", ".join(f"<span>{name} {value}</span>" for name, value in values.items())
 
 

@@ -19,6 +19,7 @@ from . import result_values
 from .result_values import Quantity
 
 MEASURE = '<button type="button" class="soft">measure</button>'
+GIVEN = " given the held forces"
 NONE = "", "–"  # values that are not there
 UNBOUNDED = (
     "S is unbounded: some forces can grow together without a load and have no largest value, so η "
@@ -85,14 +86,16 @@ def results(state: AppState, volume: xr.Dataset | None = None) -> str:
     """
     if state.missing and state.work.computation.running:
         return coming(state)
-    known = " given the held forces" if state.knowledge.known else ""
+    known = GIVEN if state.narrows else ""
+    older = bool(known) and not state.obeying
     measures = result_values.measures(state)
     sampling = result_values.sampling(state)
     count = f"{state.replay.summary['states']} networks"
     heading = f"seen in all {count}"
-    if known:
-        heading = f"seen{known} ({count})" if state.obeying else f"seen in all of S ({count})"
-        heading += "" if state.obeys_held else ", which a push ignores" * state.obeying
+    if older:
+        heading = f"older than the held forces: seen in {count}"
+    elif known:
+        heading = f"seen{known} ({count})" + ("" if state.obeys_held else ", which a push ignores")
     if not state.replay.summary["dimension"]:
         heading = "the only network"
     if sampling and sampling.verdict:
@@ -112,9 +115,10 @@ def results(state: AppState, volume: xr.Dataset | None = None) -> str:
     doubts.append(UNBOUNDED if endless else "")
     doubt = "".join(f'<p class="flag" role="note">⚠ {line}</p>' for line in filter(None, doubts))
     now, was = Shown(state.cell, state.replay, state.exact), state.before
-    change = "" if was is None else f'<p class="was">{result_values.changes(was, now)}</p>'
+    change = "" if was is None else f'<p class="was">{result_values.changes(now, was)}</p>'
     left = f'<p class="left">{worded(state.replay, left_out(state.replay.summary))}</p>'
-    return _laid_out(heading, measures, packing, rows, values, left) + doubt + change
+    line = _laid_out(heading, measures, packing, rows, values, left, known, older)
+    return line + doubt + change
 
 
 def coming(state: AppState) -> str:
@@ -126,10 +130,12 @@ def coming(state: AppState) -> str:
         one._replace(exact=one.exact if (same or state.growing) and one.exact else "–")
         for one in packing
     ]
-    rows = [[heading, *_dashes(measures)], ["exact", *_values(measures, "exact")]]
+    known = GIVEN if state.narrows else ""
+    rows = [[heading, *_dashes(measures)], [f"exact{known}", *_values(measures, "exact")]]
     was = Shown(state.cell, state.replay, state.exact)
     before = f'<p class="was">Before: {result_values.changes(was)}</p>'
-    return _laid_out(heading, measures, packing, rows, [one.exact for one in packing]) + before
+    values = [one.exact for one in packing]
+    return _laid_out(heading, measures, packing, rows, values, known=known) + before
 
 
 def _laid_out(
@@ -139,16 +145,25 @@ def _laid_out(
     rows: list[list[str]],
     values: list[str],
     left: str = "",
+    known: str = "",
+    older: bool = False,
 ) -> str:
-    """The line and the tables; rows, values: of the tables; left: what the numbers leave out."""
-    seen = [(one, one.seen, f" (exact {one.exact})" * (one.exact not in NONE)) for one in measures]
+    """The line and the tables; rows, values: of the tables; left: what the numbers leave out.
+
+    known: of which S the exact values are; older: whether the seen ones are of another.
+    """
+    seen = [
+        (one, f"<i>{one.seen}</i>", f" (exact{known} <b>{one.exact}</b>)" * (one.exact not in NONE))
+        for one in measures
+    ]
     parts = [*seen, *((one, one.exact, "") for one in packing if one.exact[:1] not in NONE)]
     line = "".join(
         f"<span>{term(one.key, one.symbol)} <b>{value}</b>{more}</span>"
         for one, value, more in parts
     )
     return (
-        f'<p class="line"><span class="of">{heading}</span>{line}{FOLD}</p><div class="tables">'
+        f'<p class="line{" older" * older}"><span class="of">{heading}</span>{line}{FOLD}</p>'
+        f'<div class="tables{" older" * older}">'
         + _table(["How undetermined", *_titles(measures)], rows)
         + _table(_titles(packing), [values])
         + f"{left}</div>"

@@ -192,7 +192,8 @@ def _full(state: AppState, most: float) -> str:
 def _of_packing(state: AppState) -> str:
     """That the scale is of this packing; after a change of μ, the scale before it."""
     was = state.before
-    if was is None or state.growing or (was.exact is None) != (state.exact is None):
+    one = was is None or was.cell.mu == state.cell.mu
+    if one or state.growing or (was.exact is None) != (state.exact is None):
         return ", this packing"
     return f"; {_saturation(was.replay, was.exact):.2f} at μ = {was.cell.mu:g}"
 

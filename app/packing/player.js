@@ -116,6 +116,8 @@ class Player {
     const shown = this.loaded !== null, zoom = shown ? null : model.zoom // from the link that opened the page
     this.loaded = model.walk
     const view = this.live.leave(), place = this.grownInto(walk)
+    // The visitor's own choice while a walk grew outlasts it; what played by itself ends with it.
+    const chosen = place !== null && !this.playback.newest, number = playing ? this.replay.walk.number[this.replay.frame] : null
     this.playback.halt()
     this.replay = new Replay(walk.room ? roomy(walk) : walk, model.between)
     this.look = new Look(model, this.replay.walk)
@@ -135,11 +137,16 @@ class Player {
     scene.resize()
     scene.repaint()
     this.live.glide(view)
-    this.show(place ?? (this.replay.swinging ? 0 : model.frame), false)
+    const rests = chosen ? !playing : walk.rests
+    if (this.replay.swinging) this.show(0, false)
+    else if (!shown) this.show(model.frame, false)
+    else if (rests && !chosen) this.show(walk.begin, false)
+    else this.show(place ?? (number === null || number > walk.states ? walk.begin : this.replay.positionOf(number)), false)
     this.tellTab()
-    this.playback.newest = walk.room > 0 || (this.playback.newest && place !== null)
-    if ((playing || walk.room) && !this.pushes) requestAnimationFrame(() => this.play(true))
-    else if (!shown) this.playFirst()
+    this.playback.newest = walk.room > 0 || (this.playback.newest && place !== null && !rests)
+    if (!shown && !walk.room) this.playFirst()
+    else if (!rests && !this.pushes) requestAnimationFrame(() => this.play(true))
+    else this.play(false)
   }
 
   /** Apply the colours of the theme. */

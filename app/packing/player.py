@@ -78,7 +78,9 @@ class Player(Scripted, Appearance):
         {"bounds": {"low": Array, "high": Array}, "number": int},
     )
 
-    walk = param.Dict(default={}, doc="geometry and frames of a Replay, see `frames`")
+    walk = param.Dict(
+        default={}, doc="geometry and frames of a Replay, see `frames`; where its player `begin`s"
+    )
     exact = param.Dict(default={}, doc="low, high (N_c,) of exact intervals of f_n in ⟨f_n⟩")
     loads = param.Array(default=None, doc="(N_c,) limit loads in ⟨f_n⟩, where colour or width ask")
     reduction = param.Array(default=None, doc="(N_c,) of ΔF_n in ⟨f_n⟩ by what is known, or None")
@@ -201,7 +203,8 @@ class Player(Scripted, Appearance):
         if self._shown is not replay:
             self._shown = replay
             room = len(progress_feed.numbers(replay.summary)) if state.growing else 0
-            changes["walk"] = frames(replay, room)
+            begin = {"begin": looks.frame, "rests": looks.paused and not state.growing}
+            changes["walk"] = frames(replay, room) | begin
         changes["keepable"] = state.keepable
         self.param.update(changes)
 

@@ -28,19 +28,22 @@ from .links import (
     Numbers,
     View,
     fitting,
+    key,
+    left_out,
     link,
     read_link,
     read_view,
     spelled,
 )
 from .page_tasks import Work
+from .place import Place
 from .pulls import Hand
 from .view_settings import Looks
 
 EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed automatically
-# Parameters of Looks that change by playing or zooming, not by the visitor's choice of view: going
-# back does not restore the previous frame or zoom.
-PASSING = ("frame", "paused", "opened", "zoom")
+# Parameters of Looks that change by playing, zooming or computing, not by the visitor's choice of
+# view: going back does not restore the previous frame or zoom.
+PASSING = ("frame", "paused", "opened", "zoom", "pushed")
 PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
 
 
@@ -60,7 +63,7 @@ class AppState(param.Parameterized):
     exact = param.Parameter(doc="Dataset of exact intervals on the same contacts, or None")
     measured = param.Parameter(doc="the photoelastic.Measured of the last frame opened, or None")
     loads = param.Parameter(doc="limit loads (N_c,) of the contacts in ⟨f_n⟩, or None if unknown")
-    before = param.Parameter(doc="the Shown before the last change if only μ changed, or None")
+    before = param.Parameter(doc="the Shown that this one replaced, or None")
     source = param.String(doc="where the states on screen come from, in words")
     plane = param.Parameter(doc="the planes.Plane of force space on screen, or None")
     pushed = param.Parameter(doc="the perturbations.Pushed of the contact in Push, or None")
@@ -91,6 +94,8 @@ class AppState(param.Parameterized):
         }
         observe(self._need_loads, self, "replay", "looks.colour", "looks.thickness")
         self._linked: tuple[Selection, View] | None = None  # of a link to states in no store
+        self._invalid: list[str] = []  # parameters of the last link that could not be read
+        self._place: Place | None = None
         self.work.computation.param.watch(self._bring_back, ["dismissed", "message"])
         observe(self._forget, self, "cell", "knowledge.known", "hand.pulls")
         observe(self._follow_held, self, "cell", "knowledge.known")
@@ -113,14 +118,34 @@ class AppState(param.Parameterized):
                 selection.check(LIMITS)
         except InputError as error:
             selection, self.work.message = None, str(error)
-        view = read_view(texts, self._viewed)
+        view, self._invalid = read_view(texts, self._viewed)
         new = {name: self._viewed[name].default for name in VIEW}  # what a link omits
         self._look_up(selection, new | view, counted="states" in parse_qs(query.lstrip("?")))
 
     def _new_view(self, selection: Selection) -> View:
         """The part of the view that belongs to states, for new states; without what stays."""
-        stays = ("contact", "known") if self._shares_packing(selection) else ()
+        stays = ("contact", "known", "pushed") if self._shares_packing(selection) else ()
         return {name: self._viewed[name].default for name in OF_A_REPLAY if name not in stays}
+
+    def _keep_place(self) -> None:
+        """Note what the visitor sees before a computation shows its own pictures."""
+        replay, looks = self.replay, self.looks
+        if replay is None or self.work.live is not None:
+            return
+        number = int(replay.number[min(looks.frame, len(replay.number) - 1)])
+        self._place = Place(
+            self.cell.selection.packing, replay, number, looks.paused, looks.contact
+        )
+
+    def _placed(self, selection: Selection, replay: Replay) -> View:
+        """The noted network and contact in other states, as far as they exist there."""
+        self._keep_place()
+        place = self._place
+        if place is None:
+            return {"paused": self.looks.paused, "frame": 0}
+        view: View = {"paused": place.paused, "frame": Numbered(place.number)}
+        contact = place.contact_in(selection.packing, replay)
+        return view if contact is None else view | {"contact": contact}
 
     @property
     def view(self) -> View:
@@ -175,6 +200,19 @@ class AppState(param.Parameterized):
         """The exact intervals of the packing on screen, given the known forces; or None."""
         narrowed = self.knowledge.narrowed
         return self.free if narrowed is None or self.elsewhere else narrowed.after
+
+    @property
+    def narrows(self) -> bool:
+        """Whether numbers are those given the held forces; a push of all of S ignores them."""
+        return bool(self.knowledge.known and (self.obeys_held or self.obeying))
+
+    @property
+    def settled(self) -> Any:
+        """The exact intervals to which numbers belong; None until all bounds exist."""
+        whole = self.knowledge.whole
+        if not self.narrows or self.elsewhere:
+            return self.free
+        return None if whole is None else whole.after
 
     @property
     def bounds(self) -> str:
@@ -366,12 +404,18 @@ class AppState(param.Parameterized):
             view = self._linked[1]
         self._linked = None
         fresh = self._new_view(cell.selection)
-        # A walk that was replaced may have reached numbers that the replay does not have.
-        if (self.shown is replay and view is None) or self._is_grown(replay):
-            fresh = {}
-        if cell.selection.held and "frame" in fresh:
+        given = self._placed(cell.selection, replay) if view is None else view
+        if self._is_grown(replay):
+            # The visitor may have chosen another contact meanwhile.
+            fresh, given = {}, view or {name: given[name] for name in ("frame", "paused")}
+        elif self.shown is replay and view is None:
+            fresh, given = {}, {}
+        fitted = fitting(given, replay)
+        fresh |= fitted
+        if "paused" in given:
+            fresh["paused"] = given["paused"]
+        if cell.selection.held and fresh.get("frame") == 0:
             fresh["frame"] = 1  # the network as packed has other forces
-        fresh |= fitting(view or {}, replay)
         held = fresh["known"] if "known" in fresh else self.knowledge.known
         if not held:
             fresh["known"] = known.stated(replay, cell.selection.held)
@@ -384,13 +428,17 @@ class AppState(param.Parameterized):
                 plane=self.plane if self.replay is replay else None,
             )  # fmt: skip
             self._look(fresh)
+        if view is not None:
+            lost = [key(name) for name in OF_A_REPLAY if name in given and name not in fitted]
+            lost, self._invalid = self._invalid + lost, []
+            self.work.message = self.work.message or left_out(lost)
 
     def _before(self, cell: Cell) -> Shown | None:
-        """The states on screen if those of a cell differ only by μ."""
+        """The states on screen if those of a cell replace them."""
         now = self.cell
-        if now is None or cell.series != now.series:
-            return None
-        return self.before if cell.mu == now.mu else Shown(now, self.replay, self.exact)
+        if now is None or cell.selection.names(now.selection):
+            return self.before
+        return Shown(now, self.replay, self.exact)
 
     def _source(self, cell: Cell | None = None) -> str:
         """The source of a cell's states, by default of the cell on screen."""
@@ -418,6 +466,7 @@ class AppState(param.Parameterized):
         except InputError as error:
             self.work.message = str(error)
             return
+        self._keep_place()
         with as_one(self.work, self):
             self.shown = self.replay
             self.work.compute(self.library, selection, self._computed)
@@ -479,12 +528,13 @@ class AppState(param.Parameterized):
     def grow(self, replay: Replay) -> None:
         """Show the Replay of a walk that begins."""
         selection = self.work.live.selection
+        contact = self._placed(selection, replay).get("contact")
         label = brief(selection, self.library.series(selection))
         source = f"μ = {selection.mu:g}, {label} (as they are sampled)"
         with as_one(*self.parts, self.work, self):
             self.work.param.update(fourfold=0, moving=False)
             self.param.update(shown=replay, plane=None, source=source, motion=None)
-            self._look(self._new_view(selection))
+            self._look(self._new_view(selection) | {"contact": contact})
 
     def follow(self) -> Following | Arriving | None:
         """The computation in progress, from `work`; if it failed, the previous view returns."""
@@ -584,6 +634,8 @@ class AppState(param.Parameterized):
         if view["beside"] == self.selection.mu:
             # Between the choice of another μ and its states, the old comparison is still on screen.
             view["beside"] = None
+        if self.looks.tab != "perturb":
+            view["pushed"] = None
         if self.looks.pulled == "push":  # every push begins with the network as packed
             view["frame"] = self._viewed["frame"].default
         changed = {

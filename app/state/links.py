@@ -1,7 +1,7 @@
 """Links: the selection and the view as the query of an address, formatted and parsed."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from typing import Any, NamedTuple
 from urllib.parse import parse_qsl, urlencode
@@ -183,6 +183,7 @@ VIEW: dict[str, Stored] = {
     "tab": Stored(str),
     "contact": Stored(integer, key="select", numbered=lambda value, contact, _: contact(value)),
     "pair": Stored(_two, _joined, "span", lambda pair, contact, _: tuple(map(contact, pair))),
+    "pushed": Stored(integer, key="push", numbered=lambda value, contact, _: contact(value)),
     "paused": Stored(_flag, int),
     "opened": Stored(lambda text: text.split("."), ".".join, "open"),
     "frame": Stored(integer, key="network", numbered=lambda value, _, network: network(value)),
@@ -266,23 +267,36 @@ def spelled(view: View, numbers: Numbers | None) -> dict[str, Any]:
     return {key(name): VIEW[name].spell(value) for name, value in view.items()}
 
 
-def read_view(given: Mapping[str, str], parameters: Any) -> View:
-    """Those of `parameters` that are in a link, parsed; invalid values are left out.
+def read_view(given: Mapping[str, str], parameters: Any) -> tuple[View, list[str]]:
+    """Those of `parameters` that are in a link, parsed, and the keys of invalid values.
 
     Values given by number become Numbered, for `fitting`.
     """
     view: View = {}
+    invalid = []
     for name, stored in VIEW.items():
-        numbers = key(name) in given and name in OF_A_REPLAY
+        spelling = key(name) if key(name) in given else name
+        if name not in parameters or spelling not in given:
+            continue
         try:
-            value = stored.read(given[key(name) if key(name) in given else name])
+            value = stored.read(given[spelling])
             parameters[name]._validate(value)
         except (KeyError, ValueError):
+            invalid.append(spelling)
             continue
+        numbers = key(name) in given and name in OF_A_REPLAY
         view[name] = Numbered(value) if numbers else value
     if "frame" in given and "frame" in view:
         view.setdefault("paused", True)  # the meaning of older links to a network
-    return view
+    if "pushed" in view:  # what it takes to see it
+        view = {"tab": "perturb", "pushing": "one"} | view | {"contact": view["pushed"]}
+    return view, invalid
+
+
+def left_out(keys: Iterable[str]) -> str:
+    """A message about the parts of a link that do not fit; empty without any."""
+    names = ", ".join(keys)
+    return f"left out of this link, as there is no such value here: {names}" if names else ""
 
 
 def fitting(view: View, replay: Replay) -> View:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from granforce.records import Packing
+from granforce.records import InputError, Packing
 from granforce.study import kinds
 from granforce.study.cells import entries
 from granforce.study.keys import Parameters
@@ -15,6 +15,7 @@ from granforce.study.responses import moved_grains
 from granforce.types import Floats, Integers
 
 from ..background.jobs import Job
+from ..background.limits import LIMITS
 from ..results import geometry
 from ..results.compute import load_or_compute
 from ..results.distributions import Row, alike, rows
@@ -24,6 +25,7 @@ from .pulls import puller_of
 
 # With fewer contacts the mean is not meaningful.
 ENOUGH_CONTACTS = 10
+UNASKED = "this push takes long, and a link starts no long computation on this server: press Find"
 
 
 class Loads(NamedTuple):
@@ -85,13 +87,20 @@ def limit_loads(library: Library, cell: Cell) -> Callable[[Job], Loads]:
     return work
 
 
-def push(library: Library, cell: Cell, replay: Replay, contact: int) -> Callable[[Job], Pushed]:
-    """Work that loads or computes the effect of a growing force pair on one contact."""
+def push(
+    library: Library, cell: Cell, replay: Replay, contact: int, *, linked: bool = False
+) -> Callable[[Job], Pushed]:
+    """Work that loads or computes the effect of a growing force pair on one contact.
+
+    linked: requested by a link, which starts no long computation on a shared server.
+    """
 
     def work(job: Job) -> Pushed:
         params = kinds.PERTURBATION.parameters(
             cell.selection.packing, mu=cell.selection.mu, contacts=[int(replay.backbone[contact])]
         )
+        if linked and LIMITS.shared and library.stored(kinds.PERTURBATION, params) is None:
+            raise InputError(UNASKED)
         stage = "limit load, then contact dynamics under a growing load"
         scale = replay.force_scale
 
@@ -99,7 +108,6 @@ def push(library: Library, cell: Cell, replay: Replay, contact: int) -> Callable
             job.stage = (
                 f"at rest under {load / scale:.3f} ⟨fₙ⟩, limit load {limit / scale:.3f} ⟨fₙ⟩"
             )
-            job.tell(load, limit)
 
         dataset = load_or_compute(
             library, job, stage, kinds.PERTURBATION, params, watch=watch,

@@ -104,6 +104,7 @@ class Looks(Appearance):
     between = param.Tuple(
         default=None, length=2, allow_None=True, doc="rows of `replay` to go to and fro between"
     )
+    pushed = param.Integer(default=None, allow_None=True, doc="contact whose push is in Push")
     drawn: Any = param.Selector(
         default="all", objects=list(DRAWN), doc="of which contacts intervals are drawn"
     )

@@ -333,7 +333,8 @@ def test_a_link_names_contacts_and_networks_by_their_own_numbers():
         if name in part.param
     }  # fmt: skip
     texts = {name: str(text) for name, text in given.items()}
-    assert fitting(read_view(texts, parameters), here) == view
+    found, invalid = read_view(texts, parameters)
+    assert fitting(found, here) == view and not invalid
 
 
 def test_older_links_name_contacts_and_networks_by_their_places(visited):
@@ -369,14 +370,55 @@ def test_a_link_to_a_network_that_was_not_kept_opens_the_nearest(visited):
     assert state.looks.frame == 5 and numbers[6] > numbers[5] + 2
 
 
+def pairs(replay):
+    """{contact: its two disks}."""
+    rows = zip(replay.links.contact, replay.links.i, replay.links.j, strict=True)
+    return {int(contact): frozenset((int(i), int(j))) for contact, i, j in rows}
+
+
+@pytest.mark.parametrize("paused", [True, False])
+def test_other_networks_keep_the_number_the_contact_and_whether_it_plays(state, paused):
+    """The contact as long as the same two disks touch, also while the networks are computed."""
+    looks, here = state.looks, pairs(state.replay)
+    (other,) = (cell for cell in state.cells() if cell.mu == 1)
+    there = pairs(state.library.shown(other).replay)
+    both = next(contact for contact, pair in here.items() if pair in there.values())
+    gone = next(contact for contact, pair in here.items() if pair not in there.values())
+    first = state.cell
+    for contact in (both, gone):
+        state.show(first)
+        wait_for(state)
+        looks.param.update(contact=contact, frame=5, paused=paused)
+        number = state.replay.number[5]
+        state.show(other)
+        wait_for(state)
+        assert state.replay.number[looks.frame] == number and looks.paused == paused
+        assert looks.contact is None if contact is gone else there[looks.contact] == here[both]
+        looks.contact = both
+        computed = other.selection._replace(seed=contact + 1)
+        state.ask(computed, at_once=True)
+        looks.paused = not paused  # as the player does during the computation
+        wait_for(state)
+        assert state.cell.selection.seed == contact + 1 and looks.paused == paused
+        assert abs(state.replay.number[looks.frame] - number) <= 1 and looks.contact == both
+    state.ask(computed._replace(states=2), at_once=True)
+    wait_for(state)
+    assert looks.frame == 0  # there is no such number
+
+
 @pytest.mark.parametrize(
     "names",
     ["contact=100000&frame=-2&between=5", "select=100000&network=-2&swing=5&span=3-3",
-     "pull=100000:1&hold=100000:1&network=31", "pull=1n-2t:3&hold=x&select=x"],
+     "pull=100000:1&hold=100000:1&network=31", "pull=1n-2t:3&hold=x&select=x", "push=x",
+     "push=100000"],
 )  # fmt: skip
-def test_views_that_make_no_sense_are_left_out(names, visited):
+def test_views_that_make_no_sense_are_left_out_and_named_in_one_line(names, visited):
     state = visited(f"mu=1&n=30&states=30&relax=nearest_piqp&colour=plaid&{names}")
-    assert state.cell.mu == 1 and state.work.message == ""
+    told = state.work.message.partition("no such value here: ")[2].split(", ")
+    given = {part.partition("=")[0] for part in names.split("&")}
+    now = {"contact": "select", "frame": "network", "between": "swing"}  # of older links
+    assert state.cell.mu == 1 and "colour" in told
+    assert all(name in told or now[name] in told for name in given)
     looks = state.looks
     assert (looks.contact, looks.frame, looks.colour, looks.between) == (None, 0, "change", None)
     assert (state.hand.pulls, state.knowledge.known, looks.pair) == ([], [], None)

@@ -259,13 +259,23 @@ def test_rounded_places_need_a_tolerance(state):
     assert state.replay.summary["contacts"] == 5
 
 
-def test_a_push_says_how_far_it_got(state, monkeypatch):
-    """Its limit load, and loads at rest, of which the last is F_crit."""
+def test_a_push_says_how_far_it_got(state):
+    """Its limit load, and loads at rest, of which the last is F_crit; and how long it can take."""
     told = []
-    monkeypatch.setattr(Job, "tell", lambda job, *progress: told.append(job.stage))
-    pushed = perturbations.push(state.library, state.cell, state.replay, 4)(Job(lambda job: None))
+
+    class Told(Job):
+        def __setattr__(self, name, value):
+            super().__setattr__(name, value)
+            if name == "stage" and self.ended:
+                told.append(self.words)
+
+    job = Told(lambda job: None)
+    assert job.wait(60)
+    pushed = perturbations.push(state.library, state.cell, state.replay, 4)(job)
     words = f"at rest under {pushed.low:.3f} ⟨fₙ⟩, limit load {pushed.limit:.3f} ⟨fₙ⟩"
-    assert words in told and len(set(told)) > 5
+    assert any(words in line for line in told) and len(set(told)) > 5
+    computing = [line for line in told if "at rest under" in line]
+    assert all(" — up to " in line for line in computing)
 
 
 def test_a_packing_without_stress_in_one_direction_has_a_warning(state):
@@ -467,7 +477,7 @@ def test_a_sample_is_handed_over_and_read(state, name):
         assert len(found(Job(lambda job: None)).packing.r) == 12
     else:
         held = {"walls": "floor", "gravity": 1.0} if name == "disks" else {}
-        S = gf.ensemble(uploads.read(files, mu=0.5 if held else 0.3, **held))
+        S = gf.ensemble(uploads.read(files, mu=float(view.mu.value), **held))
         assert S.dimension > 0 and np.isfinite(gf.intervals(S).high).all()
 
 
@@ -817,7 +827,7 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
     assert view.load.contact == 5 and not view.load.path and f"contact {number}" in view.lead.object
     view.load.hear({"push": True})
     wait_for(state, lambda: view.pushed is not None)
-    pushed = view.pushed[0]
+    pushed = view.pushed
     assert 0 < pushed.low <= pushed.high <= pushed.limit + 0.02
     numbers = view.numbers.object
     assert "F<sub>crit</sub>" in numbers and between(pushed.low, pushed.high) in numbers
@@ -876,7 +886,7 @@ def test_what_is_held_is_said_not_to_be_respected_by_a_push(state):
 
 def test_the_slider_of_a_push_has_networks_in_balance_from_none_to_the_critical_force(state):
     view = pushed(state)
-    path, replay, low = view.load.path, state.replay, view.pushed[0].low
+    path, replay, low = view.load.path, state.replay, view.pushed.low
     count = len(path["values"])
     assert path["values"][0] == 0 and path["values"][-1] == pytest.approx(low)
     normal = path["normal"].reshape(count, -1)
@@ -910,6 +920,25 @@ def test_the_field_moves_only_while_its_tab_is_seen(state):
     assert view.pushed is None and state.motion is None
 
 
+def test_a_link_brings_a_push_back(state, visited, monkeypatch):
+    view, number = pushed(state), state.replay.backbone
+    link = state.link()
+    assert f"push={number[3]}" in link and "tab=perturb" in link
+    again = visited(f"?{link.replace('&tab=perturb', '').replace('select=', 'other=')}")
+    assert again.looks.tab == "perturb" and again.looks.contact == 3
+    shown = perturb_view.View(again)
+    wait_for(again, lambda: shown.pushed is not None)
+    assert (shown.pushed.low, shown.pushed.high) == (view.pushed.low, view.pushed.high)
+    again.looks.contact = 4
+    assert "push=" not in again.link() and shown.pushed is None
+    monkeypatch.setattr(perturbations, "LIMITS", SimpleNamespace(shared=True))
+    for contact, started in ((3, True), (5, False)):  # this one is in no store
+        again.open(f"?{link.replace(f'push={number[3]}', f'push={number[contact]}')}")
+        wait_for(again)
+        assert (shown.pushed is not None) == started
+        assert ("press Find" in again.work.message) == (again.looks.pushed is None) == (not started)
+
+
 def test_limit_loads_of_all_contacts_bound_the_one_pushed(state):
     view = pushed(state)
     view.what.value = "all"
@@ -917,7 +946,7 @@ def test_limit_loads_of_all_contacts_bound_the_one_pushed(state):
     press(view.every)
     wait_for(state, lambda: view.loads is not None)
     loads, drawn = view.loads
-    assert loads.load[3] == pytest.approx(view.pushed[0].limit, abs=1e-6)
+    assert loads.load[3] == pytest.approx(view.pushed.limit, abs=1e-6)
     view.plots.objects[0].object.renderers[0].data_source.selected.indices = [8]
     assert state.looks.contact == 8
     assert list(drawn.chosen.data["y"]) == [loads.load[8]]

@@ -42,7 +42,7 @@ def test_values_are_those_of_the_states_with_errors_and_of_s(ready):
     assert float(found["extent"].exact) > float(found["extent"].seen) > 0
 
 
-def test_a_change_of_friction_alone_is_compared_until_the_next_change(state):
+def test_whatever_replaces_the_results_is_compared_with_them(state):
     seen, was = state.replay.summary, state.cell.mu
     assert state.before is None and "→" not in results(state)
     state.choose(mu=1)
@@ -55,7 +55,39 @@ def test_a_change_of_friction_alone_is_compared_until_the_next_change(state):
     assert f" at μ = {was:g})" in legend.legend(state)
     state.ask(state.cell.selection._replace(states=5), at_once=True)
     wait_for(state)
-    assert state.before is None and "→" not in results(state)
+    assert state.before.cell.mu == 1  # only the number of networks has changed
+    line = re.sub("<[^>]*>", "", results(state))
+    assert f"5 networks: η₁ {short(now['eta1'])} → " in line and "μ 1" not in line
+    contact = int(np.argmax(np.ptp(state.replay.normal, axis=0)))
+    state.knowledge.hold(contact, float(state.replay.normal[1:, contact].mean()))
+    wait_for(state)
+    state.sample_held()
+    wait_for(state)
+    line = re.sub("<[^>]*>", "", results(state))
+    assert "→" in line.partition("1 force held: η₁ ")[2]
+
+
+def test_numbers_of_one_state_are_not_mixed_with_those_of_another(state):
+    """Networks without the held forces are older; exact values wait for all bounds given them."""
+    state.compute_exact()
+    wait_for(state)
+    free = by_key(result_values.measures(state))["eta3"].exact
+    contact = int(np.argmax(np.ptp(state.replay.normal, axis=0)))
+    state.knowledge.hold(contact, float(state.replay.normal[1:, contact].mean()))
+    assert state.knowledge.whole is None and free not in results(state)
+    assert "exact given the held forces: being computed" in results(state)
+    assert 'class="line older"' in results(state)
+    wait_for(state)
+    held = by_key(result_values.measures(state))["eta3"].exact
+    assert float(held) < float(free)
+    assert f"(exact given the held forces <b>{held}</b>)" in results(state)
+    assert "older than the held forces" in results(state)
+    state.looks.tab = "perturb"  # a push ignores what is held
+    assert f"(exact <b>{free}</b>)" in results(state) and "older" not in results(state)
+    state.looks.tab = "intervals"
+    state.sample_held()
+    wait_for(state)
+    assert "older" not in results(state) and "seen given the held forces" in results(state)
 
 
 def test_free_dimensions_are_derived(ready):

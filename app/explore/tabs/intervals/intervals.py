@@ -88,10 +88,8 @@ class View(TabView):
         named += [] if looks.contact is None else [looks.contact]
         ranks = picked(order.contacts, SOME if looks.drawn == "some" else MOST_BARS, named)
         relative = looks.scale == "own"
-        # Networks of all of S exceed the bounds given held forces.
-        seen = not before or state.obeying
         beyond = self.drawing.show(
-            replay, order.contacts[ranks], exact, before, seen=seen, relative=relative
+            replay, order.contacts[ranks], exact, before, seen=state.obeying, relative=relative
         )
         self.drawing.dots.glyph.update(fill_color=now(looks.dark), line_color=now(looks.dark))
         self.drawing.mark(looks.contact)
@@ -141,10 +139,13 @@ def sentence(
     """The present meaning of pale, dark and dots, as HTML."""
     if not replay.summary["dimension"]:
         return worded(replay, HEADING + FIXED)
-    narrowed, parts = state.knowledge.narrowed, []
+    narrowed, held, parts = state.knowledge.narrowed, state.knowledge.known, []
     if exact:
         words = f"pale: {term('exact', state.bounds)}"
-        words += "; faintest: without them" if narrowed else ", every admissible network"
+        if narrowed:
+            words += "; faintest: without them"
+        else:
+            words += " without the held forces" if held else ", every admissible network"
         parts.append(mark(PALE, words))
     elif state.work.arriving is not None:
         parts.append(mark(PALE, "pale: exact, as bounds are found"))
@@ -152,7 +153,7 @@ def sentence(
     kind = "sample" if state.on_screen and state.on_screen.kind == "uniform" else "walk"
     networks = f"{'the' if state.growing else count} networks of the {kind}"
     networks += " so far" * state.growing
-    if narrowed is None or state.obeying:
+    if state.obeying:  # other networks can exceed these bounds
         parts.append(mark(DARK, f"dark: {term('seen', 'seen')} in {networks}"))
     parts.append(mark(now(state.looks.dark), _dot(state), "50%"))
     if replay.given:

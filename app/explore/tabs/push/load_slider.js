@@ -116,12 +116,21 @@ export function render({ model, view }) {
   model.on("remove", () => player()?.listeners.delete(look))
   model.on("contact", anew)
   model.on("most", scale)
+  /** Show the end of a push that was not requested here: a link named it. */
+  function reopen() {
+    if (!root.isConnected || requested || !known()) return
+    if (!player()?.pushed.possible) return void requestAnimationFrame(reopen)
+    requested = true
+    set(end())
+  }
+
   model.on(["path", "limit"], () => {
     if (!known()) return anew() // of another packing
-    requested = true
     scale()
+    reopen()
   })
   model.on("running", () => { if (!model.running && !known()) { requested = false; rising = 0; show() } })
   scale()
+  requestAnimationFrame(reopen)
   return root
 }

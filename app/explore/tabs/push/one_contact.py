@@ -17,15 +17,14 @@ F_CRIT = term("critical_force", "critical force F_crit").replace("F_crit", "F<su
 LIMIT = term("limit_load", "limit load")
 HEADING = "<b>How hard can the two disks of contact {} be pushed apart?</b> "
 ASKED = (
-    "The push begins with the network as packed, in which they press on each other with {now:.2f} "
-    "mean forces. A pair of opposite forces "
-    f"increases until disks start to move: the {F_CRIT}. Beyond the {LIMIT} no network balances "
-    "it. Click another line to push that contact."
+    "As packed they press on each other with {now:.2f} mean forces. A pair of opposite forces "
+    f"grows until disks move, at the {F_CRIT}; beyond the {LIMIT} no network balances it. Click "
+    "another line to push that contact."
 )
 FOUND = (
     "<b>At F<sub>crit</sub> {opened} contacts open {ring}, {slid} slide {spot} and {kept} "
     "hold.</b> Arrows {arrow}: the first motion, {most:.3g} times its rms for the fastest disk; "
-    "rotations are not drawn. Links keep the contact, not the push: repeat it there."
+    "rotations are not drawn."
 )
 MARKS = {
     "ring": '<span style="display:inline-block;width:8px;height:8px;border:2px solid;'

@@ -48,7 +48,7 @@ class View(TabView):
     name = "perturb"
 
     def __init__(self, state: AppState) -> None:
-        super().__init__(state, "replay", "looks.contact", "knowledge.known")
+        super().__init__(state, "replay", "looks.contact", "looks.pushed", "knowledge.known")
         self.what = question("Push", PUSHES, self.looks, "pushing", width=320, margin=(4, 8))
         self.load = LoadSlider(self._push, self._give_way)
         self.every = pmui.Button(label="Compute for all contacts", margin=(4, 8), **PRIMARY)
@@ -59,13 +59,14 @@ class View(TabView):
         self.lead, self.doing, self.numbers, self.details = note(), note(), note(), note()
         self.task = state.work.task()
         self.loads: tuple[Loads, ContactScatter] | None = None
-        self.pushed: tuple[Pushed, int, Replay] | None = None  # of this contact in this packing
+        self.pushed: Pushed | None = None
+        self._of: tuple[int, Replay] | None = None  # contact and packing of the push
         self.reached = False  # whether the push has reached the load at which disks move
         self._shown: Replay | None = None
         self.what.param.watch(self.refresh, "value")
         self.animate.param.watch(self._animate, "value")
         self.every.on_click(lambda event: self._find_loads())
-        self.task.param.watch(lambda event: self.load.param.update(running=event.new), "running")
+        self.task.param.watch(self._ended, "running")
         self.task.param.watch(self._tell, "words")
         self.looks.param.watch(self._animate, "tab")
         self.catch_up()
@@ -83,10 +84,12 @@ class View(TabView):
         what, replay = self.what.value, self.state.replay
         if replay is not self._shown:
             self._shown, self.loads = replay, None
-        if self.pushed is not None and self.pushed[1:] != (self.contact, replay):
+        if self._of is not None and not self._is_of(self.contact, replay):
             self.task.cancel()
-            self.pushed, self.reached = None, False
-        self.state.pushed = self.pushed and self.pushed[0]
+            self.pushed, self._of, self.reached = None, None, False
+        self.state.pushed = self.pushed
+        if self.looks.pushed not in (None, self.contact):
+            self.looks.pushed = None
         one, fixed = what == "one", replay is None or replay.summary["mu"] == 0
         self.load.visible = one and not fixed
         self.every.visible = what == "all" and not fixed and self.loads is None
@@ -96,8 +99,8 @@ class View(TabView):
             return
         self.load.param.update(
             contact=self.contact,
-            path={} if self.pushed is None else self.pushed[0].path,
-            limit=None if self.pushed is None else self.pushed[0].limit,
+            path={} if self.pushed is None else self.pushed.path,
+            limit=None if self.pushed is None else self.pushed.limit,
             most=float(f"{SCALE * replay.normal[0].max(initial=0.5):.2g}"),
         )
         if fixed:
@@ -107,6 +110,8 @@ class View(TabView):
         else:
             self._show(self._one(replay) if one else self._all())
             self._animate()
+            if one and self._of is None and self.looks.pushed is not None:
+                self._push(linked=True)
 
     @property
     def contact(self) -> int | None:
@@ -128,17 +133,28 @@ class View(TabView):
 
     # One contact
 
-    def _push(self) -> None:
-        """The slider was moved: compute its end."""
+    def _is_of(self, contact: int | None, replay: Replay | None) -> bool:
+        return self._of is not None and self._of[0] == contact and self._of[1] is replay
+
+    def _push(self, linked: bool = False) -> None:
+        """The slider was moved, or a link names a push: compute its end."""
         state, contact, replay = self.state, self.contact, self.state.replay
         if contact is None or replay is None or self.what.value != "one":
             return
-        work = perturbations.push(state.library, state.cell, replay, contact)
+        self._of = contact, replay
+        work = perturbations.push(state.library, state.cell, replay, contact, linked=linked)
         self.task.start(work, lambda pushed: self._push_known(pushed, contact, replay))
+        self.looks.pushed = contact
+
+    def _ended(self, event: Any) -> None:
+        """A push that failed or was cancelled is no longer requested."""
+        self.load.running = event.new
+        if not event.new and self.pushed is None:
+            self.looks.pushed = self._of = None
 
     def _push_known(self, pushed: Pushed, contact: int, replay: Replay) -> None:
-        if contact == self.contact and replay is self.state.replay:
-            self.pushed, self.reached = (pushed, contact, replay), False
+        if self._is_of(contact, replay) and replay is self.state.replay:
+            self.pushed, self.reached = pushed, False
             self.refresh()
 
     def _give_way(self) -> None:
@@ -150,7 +166,7 @@ class View(TabView):
         contact, held = self.contact, len(self.state.knowledge.known)
         if contact is None:
             return Shown("No contact carries a force.")
-        pushed = None if self.pushed is None else self.pushed[0]
+        pushed = self.pushed
         lead = one_contact.sentence(replay, contact, pushed, held)
         if pushed is None:
             return Shown(lead, details=folded(one_contact.COMPUTED))
@@ -161,7 +177,7 @@ class View(TabView):
     def _animate(self, *events: Any) -> None:
         """Show the first motion on the packing while this tab is visible."""
         shown = self.visible and self.what.value == "one" and self.reached
-        pushed = self.pushed[0] if shown and self.pushed is not None else None
+        pushed = self.pushed if shown else None
         self.state.motion = pushed and Motion(
             pushed.displacement, pushed.contacts, self.animate.value
         )
