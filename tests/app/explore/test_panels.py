@@ -39,13 +39,21 @@ from app.explore.tabs.friction import friction as statistics_view
 from app.explore.tabs.friction.claims import SAMPLERS
 from app.explore.tabs.intervals import intervals as intervals_view
 from app.explore.tabs.intervals.growth_figure import GrowthFigure
+from app.explore.tabs.intervals.known_forces import Known
 from app.explore.tabs.push import push as perturb_view
 from app.explore.tabs.push.over_packings import responses
 from app.explore.tabs.tabs import Tabs
 from app.explore.tabs.your_packing import samples
 from app.explore.tabs.your_packing import upload as upload_view
 from app.packing.player import Player, frames
-from app.results import distributions, photoelastic_frames, planes, study_data, uploads
+from app.results import (
+    distributions,
+    durations,
+    photoelastic_frames,
+    planes,
+    study_data,
+    uploads,
+)
 from app.results.library import Library
 from app.results.replays import first_replay
 from app.results.saved_file import csv
@@ -259,16 +267,17 @@ def test_rounded_places_need_a_tolerance(state):
     assert state.replay.summary["contacts"] == 5
 
 
-def test_a_push_says_how_far_it_got(state):
+def test_a_push_says_how_far_it_got(state, monkeypatch):
     """Its limit load, and loads at rest, of which the last is F_crit; and how long it can take."""
     told = []
 
     class Told(Job):
         def __setattr__(self, name, value):
             super().__setattr__(name, value)
-            if name == "stage" and self.ended:
+            if name == "stage" and "_wants" in vars(self):
                 told.append(self.words)
 
+    monkeypatch.setitem(durations._seconds, "perturbation", 1e6)  # however busy the machine
     job = Told(lambda job: None)
     assert job.wait(60)
     pushed = perturbations.push(state.library, state.cell, state.replay, 4)(job)
@@ -276,6 +285,14 @@ def test_a_push_says_how_far_it_got(state):
     assert any(words in line for line in told) and len(set(told)) > 5
     computing = [line for line in told if "at rest under" in line]
     assert all(" — up to " in line for line in computing)
+
+
+def test_the_sampler_is_chosen_beside_the_networks(state):
+    known = Known(state)
+    assert known.sampler == state.cell.kind == "walk"
+    known.hear({"sampler": "uniform"})
+    wait_for(state)
+    assert known.sampler == state.cell.kind == "uniform" and state.cell.mu == 0.1
 
 
 def test_a_packing_without_stress_in_one_direction_has_a_warning(state):

@@ -17,9 +17,9 @@ F_CRIT = term("critical_force", "critical force F_crit").replace("F_crit", "F<su
 LIMIT = term("limit_load", "limit load")
 HEADING = "<b>How hard can the two disks of contact {} be pushed apart?</b> "
 ASKED = (
-    "As packed they press on each other with {now:.2f} mean forces. A pair of opposite forces "
-    f"grows until disks move, at the {F_CRIT}; beyond the {LIMIT} no network balances it. Click "
-    "another line to push that contact."
+    "The push begins with the network as packed, in which they press on each other with {now:.2f} "
+    f"mean forces. It grows until disks move, at the {F_CRIT}; beyond the {LIMIT} no network "
+    "balances it. Click another line to push that contact."
 )
 FOUND = (
     "<b>At F<sub>crit</sub> {opened} contacts open {ring}, {slid} slide {spot} and {kept} "
