@@ -3,8 +3,11 @@
 
 import { button, createElement } from "../browser/dom.js"
 import { keepChapter } from "../browser/local_storage.js"
+import { STILL } from "../browser/motion.js"
 import { plain } from "../browser/to_object.js"
 import { CHAPTERS } from "./chapters.js"
+import { palette } from "./drawing/palette.js"
+import { ClosingPicture } from "./drawing/closing_picture.js"
 import { PredictDoSee } from "./predict_do_see.js"
 import { Progress } from "./progress.js"
 import { Source } from "./source.js"
@@ -19,7 +22,7 @@ class Lesson {
     this.root = createElement("div", { className: model.alone ? "course alone" : "course" })
     this.list = createElement("ol", {})
     const nav = createElement("nav", { ariaLabel: "Chapters" })
-    nav.append(this.list, createElement("p", { innerHTML: `<a href="?scene=pyramid">More small scenes</a><a href="?scene=own">Build your own</a>` }))
+    nav.append(this.list, createElement("a", { href: "?scene=own", textContent: "Build your own" }))
     this.main = createElement("article", {})
     this.root.append(nav, this.main)
     this.returned = () => this.open(this.named)
@@ -105,30 +108,32 @@ class Lesson {
     voice.textContent = "Loading … The first time on a server, this can take a minute."
     const [picture, plot] = ["picture", "plot"].map((className) => createElement("figure", { className }))
     const knob = createElement("label", { className: "knob", hidden: true }), row = createElement("div", { className: "row" }), turn = createElement("span", { className: "turn" })
-    const move = (words, step) => button(words, () => this.go(number + step), { disabled: !CHAPTERS[number + step] })
-    turn.append(move("◂ Back", -1), last ? "" : move("Next ▸", 1))
+    const next = last ? button("Your eight predictions ▾", () => after.scrollIntoView({ behavior: STILL.matches ? "auto" : "smooth" }))
+      : button("", () => this.go(number + 1), { innerHTML: `Next<span>: ${CHAPTERS[number + 1].title}</span> ▸` })
+    turn.append(button("◂", () => this.go(number - 1), { ariaLabel: "Back", disabled: !number }), next)
     row.append(turn)
     const { pathname } = window.location, { scene } = chapter.options
     const onwards = last ? `<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with this scene</a>` : ""
-    const after = createElement("p", { className: "after", innerHTML: onwards })
+    const after = createElement("div", { className: "after", innerHTML: onwards })
+    this.closing = last ? new ClosingPicture(after) : null
     const foot = createElement("div", { className: "foot" }) // always in view, as it says what to do next
     foot.append(voice, row)
     this.main.className = "waiting"
     left.append(picture, extra)
     this.main.replaceChildren(heading, text, left, plot, knob, foot, after)
     if (chapter.live) plot.after(extra) // next to what is dragged
-    return { text, picture, plot, extra, knob, voice, row, foot, after }
+    return { text, picture, plot, extra, knob, voice, row, foot, after, next }
   }
 
   /** The list of chapters, with finished ones marked. */
   show() {
     this.list.replaceChildren(...CHAPTERS.map(({ name, title }, k) => {
-      const item = createElement("li", {}), link = item.appendChild(createElement("a", { textContent: title, href: this.address(name) }))
+      const item = createElement("li", { className: this.progress.of(name).done ? "done" : "" }), link = item.appendChild(createElement("a", { textContent: title, href: this.address(name) }))
       if (k === this.number) {
         link.ariaCurrent = "step"
         requestAnimationFrame(() => this.list.parentNode.scrollTo({ left: item.offsetLeft - 40 })) // if the list is horizontal
       }
-      if (this.progress.of(name).done) item.append(createElement("span", { className: "done", textContent: " ✓", title: "done" }))
+      if (item.className) link.title = "done"
       link.addEventListener("click", (event) => {
         if (event.metaKey || event.ctrlKey || event.shiftKey) return
         event.preventDefault()
@@ -142,7 +147,10 @@ class Lesson {
     if (this.asks) return
     this.asks = requestAnimationFrame(() => {
       this.asks = 0
-      if (this.mechanism) this.experiment.draw(this.model.dark, plain(this.model.palettes))
+      const { mechanism, experiment, model: { dark, palettes }, closing, progress } = this
+      if (!mechanism) return
+      if (experiment.draw(dark, plain(palettes))) this.paint()
+      else if (mechanism.stage === 2) closing?.draw(experiment.canvas.scene, CHAPTERS.map(({ name, title, x }) => ({ title, x, ...progress.of(name) })), palette(dark))
     })
   }
 }

@@ -6,23 +6,23 @@ import { STILL } from "../browser/motion.js"
 import { QuantityPlot } from "./drawing/quantity_plot.js"
 
 const PREDICT = "Drag the marker to your prediction.", WAIT = "Computing the networks … The first time on a server, this can take a minute."
-const STAGES = ["Predict", "Do", "See"]
+const STAGES = ["1 Predict", "2 Do"]
+const NEAR = 0.03 // of the axis: a prediction that is right
 
 export class PredictDoSee {
   /**
-   * chapter: of chapters.js; experiment: loaded; parts: {plot, extra, knob, voice, row, foot, after}: their elements; progress: {prediction,
+   * chapter: of chapters.js; experiment: loaded; parts: {plot, extra, knob, voice, row, foot, after, next}: their elements; progress: {prediction,
    * done} of an earlier visit; save({prediction, done}): called to store progress; drawn(): called to repaint;
    * again(): called to start the chapter anew.
    */
-  constructor(chapter, experiment, { plot, extra, knob, voice, row, foot, after }, { prediction, done }, { save, drawn, again }) {
-    Object.assign(this, { chapter, experiment, host: plot, extra, knob, voice, row, foot, after, save, drawn, prediction, predicted: false, ready: true, announced: done })
+  constructor(chapter, experiment, { plot, extra, knob, voice, row, foot, after, next }, { prediction, done }, { save, drawn, again }) {
+    Object.assign(this, { chapter, experiment, host: plot, extra, knob, voice, row, foot, after, next, save, drawn, prediction, predicted: false, ready: true, announced: done })
     plot.classList.toggle("plane", Boolean(chapter.y))
     this.plot = new QuantityPlot(plot, chapter, { marker: (value) => this.mark(value), dot: (x, y) => experiment.drag(x, y) })
     this.button = button("That is my prediction", () => this.begin(), { className: "primary" })
-    this.stages = createElement("span", { className: "stages" })
-    this.again = button("Again", again, { className: "again" })
-    this.offer = button("", () => experiment.offer.run(), { className: "primary" })
-    row.prepend(this.button, this.stages, this.offer, this.again)
+    this.again = button("Again", again)
+    this.offer = button("", () => experiment.offer.run())
+    row.prepend(this.button, this.offer, this.again)
     if (experiment.knob) this.turnable()
     if (done) this.finish()
     else this.show()
@@ -91,7 +91,7 @@ export class PredictDoSee {
   show() {
     const { experiment, stage, prediction } = this, { picture } = experiment
     const news = stage === 2 && !this.announced
-    if (news) this.save({ prediction, done: (this.announced = true) })
+    if (news) this.save({ prediction, answer: experiment.range, done: (this.announced = true) })
     const words = picture.words ?? `now ${this.named(experiment.value)}`
     const guess = { value: prediction ?? this.waiting, words: prediction === null ? "your prediction: ?" : `your prediction: ${this.named(prediction)}` }
     const answer = stage === 2 && !picture.unanswered ? { value: experiment.answer, words: this.named(experiment.answer) } : null
@@ -101,10 +101,11 @@ export class PredictDoSee {
     this.button.disabled = prediction === null
     this.again.hidden = this.after.hidden = stage < 2
     const offer = stage && this.ready ? experiment.offer : null
-    Object.assign(this.offer, { hidden: !offer, textContent: offer?.words ?? "" })
+    Object.assign(this.offer, { hidden: !offer, textContent: offer?.words ?? "", className: stage < 2 ? "primary" : "" })
+    this.next.className = stage < 2 ? "" : "primary" // one at a time
+    this.host.classList.toggle("found", stage === 2)
     this.knob.hidden = stage < (experiment.knob?.stage ?? 3) || !this.ready
     if (this.slider) Object.assign(this.slider, { value: experiment.turned.value, ariaValueText: (this.said.textContent = experiment.turned.words) })
-    this.stages.replaceChildren(...STAGES.map((name, k) => createElement("span", { textContent: `${k + 1} ${name}${stage > k || stage === 2 ? " ✓" : ""}`, className: k === stage ? "on" : "" })))
     this.speak(stage)
     this.drawn()
     if (news) this.reveal()
@@ -124,7 +125,7 @@ export class PredictDoSee {
     const { chapter, experiment, voice, extra } = this, { facts } = experiment
     if (stage < 2) {
       const words = stage === 0 ? PREDICT : this.ready ? chapter.doing(facts) : WAIT
-      this.say(voice, [words], () => [createElement("p", { textContent: words })])
+      this.say(voice, [words], () => [createElement("p", { className: "todo", innerHTML: `<b>${STAGES[stage]}</b> ${words}` })])
     } else {
       const sentences = chapter.see(facts)
       this.say(voice, sentences, () => this.answer(sentences))
@@ -143,10 +144,10 @@ export class PredictDoSee {
 
   /** The answer next to the prediction, with its reason, the surprise and more. */
   answer(sentences) {
-    const { chapter, experiment, prediction } = this
+    const { chapter: { x, verdict: judged }, experiment, prediction } = this, off = experiment.answer - prediction
     const verdict = createElement("p", { className: "verdict" })
-    const is = chapter.verdict?.(experiment.facts, prediction) ?? { answer: `It is ${this.named(experiment.answer)}.`, so: "" }
-    verdict.append(createElement("b", { textContent: is.answer }), ` You predicted ${this.named(prediction)}${is.so}.`)
+    const is = judged?.(experiment.facts, prediction) ?? { answer: `It is ${this.named(experiment.answer)}.`, so: x.log ? "" : Math.abs(off) < NEAR * (x.high - x.low) ? ": well done" : `, ${this.named(Math.abs(off))} too ${off > 0 ? "low" : "high"}` }
+    verdict.append(createElement("b", { textContent: is.answer }), createElement("span", { textContent: ` You predicted ${this.named(prediction)}${is.so}.` }))
     return [verdict, ...sentences.map((innerHTML) => createElement("p", { innerHTML }))]
   }
 }

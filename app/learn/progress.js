@@ -7,7 +7,7 @@ export class Progress {
     try { this.chapters = JSON.parse(localStorage.getItem(KEY)) ?? {} } catch { this.chapters = {} }
   }
 
-  /** {prediction, done} of a chapter. */
+  /** {prediction, answer, done} of a chapter. */
   of(name) { return this.chapters[name] ?? { prediction: null, done: false } }
 
   set(name, more) {

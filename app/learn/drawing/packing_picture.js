@@ -48,12 +48,12 @@ export class PackingPicture {
     scene.view = { x, y, half: part * scene.whole.half }
   }
 
-  /** The network: normal forces, blue if smaller than `before`, orange if larger, or all grey without it. */
+  /** The network: normal forces, blue if smaller than `before`, orange if larger. */
   draw(normal, before, palettes) {
     const { scene, style } = this, colours = palettes.change, middle = colours.length >> 1
     for (let c = 0; c < normal.length; c++) {
       style.width[c] = normal[c] > 1e-6 ? WIDTH * normal[c] : 0
-      const part = before ? Math.max(-1, Math.min(1, (normal[c] - before[c]) / FULL)) : 0
+      const part = Math.max(-1, Math.min(1, (normal[c] - before[c]) / FULL))
       style.bin[c] = Math.round(middle * (1 + part))
     }
     style.colours = colours

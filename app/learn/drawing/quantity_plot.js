@@ -15,7 +15,7 @@ function element(parent, tag, attributes = {}) {
 }
 
 /** One axis: {low, high, label, log, ticks, stops}, and its position in pixels. */
-class Scale {
+export class Scale {
   constructor(axis, from, to) { Object.assign(this, { axis, from, to }) }
 
   part(value) {
@@ -208,6 +208,7 @@ export class QuantityPlot {
 
   /** Allow a handle to be dragged: "marker", "dot" or none. */
   allow(handle) {
+    if (handle !== this.allowed) this.svg.classList.add("fresh") // until it is moved
     this.allowed = handle
     for (const [one, group] of [["marker", this.marker.group], ["dot", this.dot]]) {
       group.setAttribute("tabindex", one === handle ? 0 : -1)
@@ -246,6 +247,7 @@ export class QuantityPlot {
   }
 
   move(px, py) {
+    this.svg.classList.remove("fresh")
     if (this.movable === "marker") this.hears.marker(this.x.value(px))
     if (this.movable === "dot") this.hears.dot(this.x.value(px), this.y ? this.y.value(py) : 0)
   }
@@ -255,6 +257,7 @@ export class QuantityPlot {
     if (right === undefined || !this.movable) return
     event.preventDefault()
     event.stopPropagation()
+    this.svg.classList.remove("fresh")
     if (this.movable === "marker") return this.hears.marker(this.x.step(this.state.marker.value, right || up, event.shiftKey))
     const [x, y] = this.state.now
     if (!this.y) return this.hears.dot(this.x.step(x, right || up, event.shiftKey), 0)

@@ -8,7 +8,8 @@ import { ASIDE, drawNames, drawValues } from "./force_labels.js"
 import { circle, inside, line, polygon, unflat } from "../../browser/canvas_paths.js"
 
 const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is room
-const LONG = 0.27 // of the picture: largest radius
+const LONG = 0.27 // of the picture: largest radius of a disk
+const LEAN = 0.42, WORDS = 90 // of the picture without this many px: the same of another body
 const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // positions of the number: the centre, and around it
 const NAMED = 3 // most disks, and most contacts of a single one, for which the numbered components of forces are drawn
 
@@ -58,7 +59,7 @@ export class Arrows {
     const rooms = [0.1, tall(scene) ? 0.02 : box[0] ? 0.12 : 0.1]
     const [across, up] = [right - left, high - low].map((size, k) => size * (1 + 2 * rooms[k]))
     this.unit = Math.min(width / across, height / up)
-    this.unit = Math.min(this.unit, LONG * Math.min(width, height) / Math.max(...r))
+    this.unit = Math.min(this.unit, (this.outline(0) ? LEAN * (Math.min(width, height) - WORDS) : LONG * Math.min(width, height)) / Math.max(...r))
     this.x0 = width / 2 - (this.unit * (left + right)) / 2
     this.y0 = height / 2 + (this.unit * (low + high)) / 2
   }
@@ -286,7 +287,7 @@ export class Arrows {
   arrow(px, py, force, colour, thick) {
     const { context: g } = this, unit = this.unit * this.forceUnit
     let [dx, dy] = [force[0] * unit, -force[1] * unit], size = Math.hypot(dx, dy)
-    const most = 0.45 * Math.min(this.easel.wide, this.easel.high)
+    const most = 0.5 * Math.min(this.easel.wide, this.easel.high)
     if (size < 1.5) return
     const cut = size > most
     if (cut) { dx *= most / size; dy *= most / size; size = most }

@@ -29,6 +29,7 @@ export class Friction extends PackingExperiment {
     const packing = this.packing = this.packings.get(this.value)
     this.network = Float32Array.from(this.asPacked(packing))
     this.before = this.asPacked(packing)
+    this.shown = null
     this.canvas.show(packing, packing.grabbed)
     this.answered ||= this.visited.size === this.stops.length
     this.changed()
@@ -36,13 +37,13 @@ export class Friction extends PackingExperiment {
 
   play(time) {
     this.frame = requestAnimationFrame((next) => this.play(next))
-    const { packing, palettes, network } = this, rows = packing.number.length, { normal, contacts } = packing
+    const { packing, network } = this, rows = packing.number.length, { normal, contacts } = packing
     if (!this.host.isConnected) return
     const at = (time / 1000 / SECONDS) % (rows - 2), part = STILL.matches ? 0 : at % 1, row = 1 + Math.floor(at)
     if (STILL.matches && row === this.row) return
     this.row = row
     for (let c = 0; c < contacts; c++) network[c] = (1 - part) * normal[row * contacts + c] + part * normal[(row + 1) * contacts + c]
-    this.canvas.draw(network, this.before, palettes)
+    this.draw(null, this.palettes)
   }
 
   /** The friction at which forces vary most. */

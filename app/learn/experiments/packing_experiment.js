@@ -1,6 +1,7 @@
 // Common parts of the chapters with 400 disks: a packing, a marked contact, a picture of both.
 
 import { createElement } from "../../browser/dom.js"
+import { eased } from "../../browser/motion.js"
 import { OPENS } from "../../packing/drawing/first_motion.js"
 import { PackingPicture } from "../drawing/packing_picture.js"
 
@@ -48,12 +49,17 @@ export class PackingExperiment {
   /** A line of text in the picture; none if empty. */
   say(words) { Object.assign(this.label, { textContent: words, hidden: !words }) }
 
+  /** Draw the lines on their way to the network; returns whether they have not arrived. */
   draw(dark, palettes) {
     this.palettes = palettes
-    if (!this.network) return
+    if (!this.network) return false
+    this.shown = eased(this.shown, this.network)
     this.canvas.limited = this.limited
-    this.canvas.draw(this.network, this.before ?? null, palettes)
+    this.canvas.draw(this.shown, this.before, palettes)
+    return this.shown !== this.network
   }
+
+  get range() { return [this.answer, this.answer] }
 
   /** From the least to the largest value. */
   finish({ x }) { for (const to of [x.low, x.high]) this.drag(to) }

@@ -96,7 +96,8 @@ export class Push extends PackingExperiment {
   /** S on the force of the line, against the push, and, once disks moved, the force of this network until then. */
   get aside() {
     const { options, path: { values, normal, band, contact, limit }, packing: { contacts }, limit: most, pushed } = this
-    const rows = Array.from({ length: band.length / 3 }, (_, k) => band.subarray(3 * k, 3 * k + 3)), edge = (d) => rows.map((row) => [row[0], row[d]])
+    const rows = Array.from({ length: band.length / 3 }, (_, k) => band.subarray(3 * k, 3 * k + 3)).filter((row) => row.every(Number.isFinite)) // not certified: next to the limit load
+    const edge = (d) => rows.map((row) => [row[0], row[d]])
     return {
       axes: options, filled: true, walk: true, exact: [...edge(1), ...edge(2).reverse()], seen: pushed ? Array.from(values, (push, k) => [push, normal[k * contacts + contact]]) : [],
       answer: pushed ? { value: most, words: `disks move: ${most.toFixed(2)}` } : null, lines: [{ value: limit, words: `S ends: ${limit.toFixed(2)}` }],

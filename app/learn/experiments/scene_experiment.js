@@ -1,7 +1,7 @@
 // Chapters of small scenes: the bodies with their forces, and the explored part of S over one or two
 // forces.
 
-import { STILL } from "../../browser/motion.js"
+import { eased } from "../../browser/motion.js"
 import { unflat } from "../../browser/canvas_paths.js"
 import { Arrows } from "../drawing/scene_canvas.js"
 import { fixed } from "../model/middle.js"
@@ -14,7 +14,7 @@ import { createElement } from "../../browser/dom.js"
 const FOUND = 0.01 // relative distance from an end at which it counts as found
 const ROUND = 0.9 // part of S that a path round it has to enclose
 const ENDLESS = 100 // of the loads: how far an unbounded S is drawn, beyond all axes
-const STEPS = 20, SECONDS = 0.4 // to other forces behind the same dot
+const STEPS = 20 // of a walk to other forces behind the same dot
 const FRICTION = { label: "friction μ", max: 1.2, step: 0.05, stage: 2 }
 
 export class SceneExperiment {
@@ -69,7 +69,6 @@ export class SceneExperiment {
 
   /** Another friction: S is cut again, and explored anew. */
   turn(mu) {
-    cancelAnimationFrame(this.frame)
     this.hand.cut(mu)
     Object.assign(this, { way: [], others: null, varied: mu !== this.scene.mu })
     this.end()
@@ -102,6 +101,9 @@ export class SceneExperiment {
   get at() { return this.flat(this.body.u) }
   get value() { return this.at[0] }
   get answer() { return this.high }
+
+  /** What the prediction is compared with in the end: one value, or all possible ones. */
+  get range() { return [this.options.goal === "both" ? this.low : this.high, this.high] }
 
   /** Numbers that the text needs. */
   get facts() {
@@ -143,22 +145,12 @@ export class SceneExperiment {
   change() {
     const { body, options: { x, y } } = this, from = body.u
     this.random ??= fixed()
-    let to = from
-    for (let k = 0; k < STEPS; k++) to = body.step(to, this.random, [x, y])
-    this.others = Math.hypot(...to.map((v, d) => v - from[d])) > FOUND * body.scaleOf()
-    this.go(from, to, STILL.matches ? -Infinity : performance.now())
-  }
-
-  /** Move from one point of S to another, which began at this time. */
-  go(from, to, began) {
-    const part = Math.min(1, (performance.now() - began) / (1000 * SECONDS))
-    this.body.u = from.map((v, d) => v + part * (to[d] - v))
+    for (let k = 0; k < STEPS; k++) body.u = body.step(body.u, this.random, [x, y])
+    this.others = Math.hypot(...body.u.map((v, d) => v - from[d])) > FOUND * body.scaleOf()
     this.changed()
-    if (part < 1) this.frame = requestAnimationFrame(() => this.go(from, to, began))
   }
 
   moved() {
-    cancelAnimationFrame(this.frame)
     this.others = null
     this.way = hull([...(this.way.length ? this.way : [this.varied ? this.at : this.start]), this.at])
     this.answered ||= this.reached
@@ -203,20 +195,23 @@ export class SceneExperiment {
     }
   }
 
+  /** Draw the forces on their way to the point of S; returns whether they have not arrived. */
   draw(dark) {
     const { arrows, hand, canvas, options: { x, y } } = this
-    if (!hand || !canvas.clientWidth) return
-    if (arrows.body !== hand.body || arrows.wide !== canvas.clientWidth) {
-      const { body } = hand, { u } = body
+    if (!hand || !canvas.clientWidth) return false
+    const { body } = hand, { u } = body
+    if (arrows.body !== body || arrows.wide !== canvas.clientWidth) {
       body.u = this.begun // the same scale, wherever the dot is
       arrows.fit(body)
-      body.u = u
       arrows.wide = canvas.clientWidth
     }
+    body.u = this.shown = eased(this.shown, u)
     this.label.textContent = this.edge
     const colours = palette(dark), axes = new Map(y === null ? [] : [[x, colours.across], [y, colours.up]])
     arrows.draw({ ...colours, axes, contacts: this.lit, contact: null, disk: null, fall: null, unnamed: this.hidden })
+    body.u = u
+    return this.shown !== u
   }
 
-  stop() { cancelAnimationFrame(this.frame) }
+  stop() {}
 }

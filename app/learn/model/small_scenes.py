@@ -121,7 +121,8 @@ def names(packing: Packing, count: int) -> list[str]:
             places.append(f"between {many} {i + 1} and {j + 1}{end}")
             continue
         wall = "floor" if n_y < -0.9 else "ceiling" if n_y > 0.9 else "right wall"
-        wall = "left wall" if wall == "right wall" and n_x < 0 else wall
+        if wall == "right wall":  # the only one of a ladder
+            wall = "wall" if one == "ladder" else "left wall" if n_x < 0 else wall
         wall = "press" if j < count + lids else wall
         places.append((f"{one} {i + 1} at the {wall}" if several else f"at the {wall}") + end)
     return places

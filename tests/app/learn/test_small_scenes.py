@@ -55,7 +55,7 @@ def test_forces_less_equations_is_free(name):
 
 def test_the_ladder_is_drawn_between_two_lines_and_stones_have_two_ends():
     ladder, stones = small_scenes.drawn("ladder"), small_scenes.drawn("stones")
-    assert ladder["names"] == ["at the floor", "at the right wall"] and ladder["h"] == 1
+    assert ladder["names"] == ["at the floor", "at the wall"] and ladder["h"] == 1
     assert len(ladder["walls"]) == 2 * 4 and len(ladder["outlines"]) == 1
     assert stones["names"][:2] == [
         f"between stones 1 and 2 ({end} end)" for end in ("lower", "upper")

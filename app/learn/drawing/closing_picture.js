@@ -1,0 +1,46 @@
+// The end of the lesson: the last network, with all predictions beside the answers, as a picture to keep.
+
+import { circle, line } from "../../browser/canvas_paths.js"
+import { createElement, button } from "../../browser/dom.js"
+import { save } from "../../browser/download.js"
+import { Scale } from "./quantity_plot.js"
+
+const WIDE = 1200, HIGH = 630 // px, as links are previewed
+const RAIL = { left: 860, right: 1150, top: 190, step: 50 } // of the predictions
+const TITLE = ["How far can forces go", "while nothing moves?"]
+
+export class ClosingPicture {
+  constructor(host) {
+    this.canvas = createElement("canvas", { width: WIDE, height: HIGH, role: "img" })
+    host.prepend(this.canvas, button("Save this picture", () => this.canvas.toBlob((blob) => save(blob, "granforce-lesson.png")), { className: "save" }))
+  }
+
+  /** scene: the packing on screen; chapters: [{title, x: axis, prediction, answer: [low, high]}]; look: as from palette. */
+  draw(scene, chapters, look) {
+    const g = this.canvas.getContext("2d"), { left, right, top, step } = RAIL, place = (x, value) => new Scale(x, left, right).px(Math.min(x.high, Math.max(x.low, value)))
+    const write = (text, x, y, colour, font) => { Object.assign(g, { fillStyle: colour, font: `${font} sans-serif` }); g.fillText(text, x, y) }
+    g.fillStyle = look.paper
+    g.fillRect(0, 0, WIDE, HIGH)
+    for (const { canvas } of [scene.disks, scene.chains, scene.marks]) g.drawImage(canvas, 0, 0, HIGH, HIGH)
+    TITLE.forEach((words, k) => write(words, HIGH + 40, 66 + 40 * k, look.ink, "bold 32px"))
+    write("○ my prediction", HIGH + 40, 150, look.hand, "18px")
+    write("● the answer", HIGH + 200, 150, look.cold, "18px")
+    chapters.forEach(({ title, x, prediction = null, answer }, k) => {
+      const y = top + step * k
+      write(title, HIGH + 40, y + 6, look.ink, "18px")
+      Object.assign(g, { strokeStyle: look.edge, lineWidth: 1.5 })
+      line(g, [left, y], [right, y])
+      if (answer) {
+        Object.assign(g, { strokeStyle: look.cold, lineWidth: 16, lineCap: "round" })
+        line(g, ...answer.map((value) => [place(x, value), y]))
+      }
+      if (prediction === null) return
+      circle(g, [place(x, prediction), y], 8)
+      Object.assign(g, { strokeStyle: look.hand, lineWidth: 3 })
+      g.stroke()
+    })
+    write("granforce: forces in packings of disks", HIGH + 40, 602, look.weight, "16px")
+    const named = chapters.filter(({ prediction, answer }) => answer && prediction !== null).map(({ title, prediction, answer }) => `${title}: ${prediction.toPrecision(2)}, answer ${answer.map((v) => v.toPrecision(2)).join(" to ")}`)
+    this.canvas.ariaLabel = `Your predictions. ${named.join("; ")}`
+  }
+}
