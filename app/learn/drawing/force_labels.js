@@ -3,9 +3,8 @@
 import { distance } from "../model/polytope.js"
 import { number } from "../model/sentences.js"
 
-const NAMED = 30 // px: least length of a component with a label
+const NAMED = 30 // px: least distance of a foot from the weight
 const SMALL = 300 // px: height of a drawing in which values have no names
-const ROOMY = 70 // px: least radius of a disk inside which these labels have room
 export const ASIDE = 9 // px between friction and the wall that would cover it
 
 /** Values next to the forces used as axes of S, on the side of each with more room. */
@@ -61,23 +60,4 @@ export function drawNames(arrows, F) {
   }
   const load = Math.hypot(body.load[0], body.load[1]), thin = arrows.outline(0)
   if (load > 1e-9) write(cx + (thin ? 8 : 0), cy + (thin ? load * arrows.forceUnit : -0.55 * scene.r[0]) * arrows.unit, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], thin ? "left" : "center")
-  if (scene.r[0] * arrows.unit > ROOMY) drawParts(arrows, arrows.ends()[0], F)
-}
-
-/** The components of one force, labelled. */
-function drawParts(arrows, { contact, at, inward, across }, F) {
-  const { context: g, look } = arrows, [px, py] = arrows.px(...at), unit = arrows.unit * arrows.forceUnit
-  const tip = (way, long) => [px + way[0] * long * unit, py - way[1] * long * unit]
-  const [nx, ny] = tip(inward, F[2 * contact]), [tx, ty] = tip(across, F[2 * contact + 1]), right = inward[0] > 0
-  const write = (text, x, y, align) => {
-    g.textAlign = align
-    g.strokeText(text, x, y)
-    g.fillText(text, x, y)
-  }
-  g.font = "12px sans-serif"
-  g.fillStyle = look.cold
-  g.strokeStyle = look.paper
-  g.lineWidth = 3
-  if (F[2 * contact] * unit > NAMED) write("normal", nx + (right ? -3 : 3), ny - 9, right ? "right" : "left")
-  if (Math.abs(F[2 * contact + 1]) * unit > NAMED && Math.abs(inward[0]) > 0.3) write("friction", tx + ASIDE * inward[0] + (right ? 6 : -6), ty - ASIDE * inward[1] + 8, right ? "left" : "right")
 }

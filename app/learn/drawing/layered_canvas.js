@@ -2,10 +2,9 @@
 // copied; it is opaque, which halves the work of a browser without a graphics card.
 
 export class Easel {
-  /** ratio: pixels of the canvas per pixel of the page. */
-  constructor(canvas, ratio = window.devicePixelRatio || 1) {
+  constructor(canvas) {
     this.canvas = canvas
-    this.ratio = ratio
+    this.ratio = window.devicePixelRatio || 1 // pixels of the canvas per pixel of the page
     this.still = document.createElement("canvas")
     this.g = canvas.getContext("2d", { alpha: false })
     this.measure()

@@ -1,11 +1,11 @@
-// S as a line, with the events at its ends; and axes of forces, below S and next to it.
+// S as a line; and axes of forces, below S and next to it.
 
 import { line } from "../../browser/canvas_paths.js"
 import { forceName, number } from "../model/sentences.js"
 
 const TICKS = 70 // least pixels between two numbers of an axis
 
-/** The line, with the events at its ends. */
+/** The line, with marks at its ends. */
 export function drawSegment(space) {
   const { context: g, body, look, easel } = space
   const ends = body.corners.map(({ u }) => space.px(space.flat(u))), y0 = ends[0][1]
@@ -17,21 +17,11 @@ export function drawSegment(space) {
   line(g, ends[0], ends[1] ?? ends[0])
   const [a, b] = [ends[0], ends.at(-1)]
   if (Math.abs(b[0] - a[0]) > 160) space.write(0.8 * a[0] + 0.2 * b[0], y0 + 24, "S", look.cold, 22)
-  g.font = "13px sans-serif"
-  let before = null // words at the other end
   for (const side of ends.length > 1 ? body.sides : []) {
-    const [x, y] = ends[side.corners[0]], lit = space.lit(side), words = side.cap ? "no end this way" : space.handler("words", side)
-    const text = g.measureText(words).width > 0.45 * easel.wide ? words.replace(/, | (?=and (?:at|between) )/, "\n") : words
-    const wide = Math.max(...text.split("\n").map((part) => g.measureText(part).width)), high = text.includes("\n") ? 40 : 30
-    const middle = Math.min(Math.max(x, wide / 2 + 5), easel.wide - wide / 2 - 5) // as written
-    const close = before && Math.abs(before.x - middle) < (before.wide + wide) / 2 + 12
+    const [x, y] = ends[side.corners[0]]
     if (side.cap) space.drawOn([x, y], 7)
-    else { g.fillStyle = lit ? look.hand : look.cold; g.fillRect(x - 3, y - 13, 6, 26) }
-    const above = y - high - (close ? 44 : 0)
-    space.write(x, above, text, lit ? look.hand : look.ink)
-    space.free([middle, above], wide, 16 * text.split("\n").length)
+    else { g.fillStyle = space.lit(side) ? look.hand : look.cold; g.fillRect(x - 3, y - 13, 6, 26) }
     space.labels.push({ side, x, y, reach: 30 })
-    before = { x: middle, wide }
   }
 }
 

@@ -1,5 +1,5 @@
 // The small scene: disks, walls, the force on each disk at each contact as an arrow within its
-// cone, and, for a highlighted disk, the closed polygon of its forces.
+// cone.
 
 import { shape } from "../model/contact_curves.js"
 import { distance, dot } from "../model/polytope.js"
@@ -13,17 +13,11 @@ const LEAN = 0.42, WORDS = 90 // of the picture without this many px: the same o
 const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // positions of the number: the centre, and around it
 const NAMED = 3 // most disks, and most contacts of a single one, for which the numbered components of forces are drawn
 
-/** Whether a scene is so much taller than wide that it needs a tall picture. */
-export function tall({ name, x, box }) {
-  const extent = (k) => { const all = x.filter((_, n) => n % 2 === k); return Math.max(...all) - Math.min(...all) }
-  return name !== "own" && !box[0] && extent(1) > 4 * extent(0) && extent(0) > 0
-}
-
 export class Arrows {
-  constructor(root, handler, ratio) {
+  constructor(root, handler) {
     this.handler = handler // handler(what, …): called for pointer events
     this.canvas = root
-    this.easel = new Easel(root, ratio)
+    this.easel = new Easel(root)
     this.hover = null
     this.held = null
     const at = (event) => this.easel.at(event)
@@ -56,7 +50,7 @@ export class Arrows {
     if (box[0]) { xs.splice(0, Infinity, 0, box[0]); ys.splice(0, Infinity, 0, box[1]) }
     const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)]
     const { wide: width, high: height } = this.easel
-    const rooms = [0.1, tall(scene) ? 0.02 : box[0] ? 0.12 : 0.1]
+    const rooms = [0.1, box[0] ? 0.12 : 0.1]
     const [across, up] = [right - left, high - low].map((size, k) => size * (1 + 2 * rooms[k]))
     this.unit = Math.min(width / across, height / up)
     this.unit = Math.min(this.unit, (this.outline(0) ? LEAN * (Math.min(width, height) - WORDS) : LONG * Math.min(width, height)) / Math.max(...r))
@@ -121,7 +115,6 @@ export class Arrows {
     if (look.carried) this.drawCarried(shape(look.carried))
     if (look.handle) this.drawHandle(...look.handle.map((end) => this.px(...end)))
     if (look.cursor) this.drawCursor(this.px(...look.cursor))
-    if (F && look.disk !== null && look.disk < body.scene.r.length) this.drawPolygon(look.disk, F)
   }
 
   /** more: a wall being drawn. */
@@ -343,41 +336,6 @@ export class Arrows {
       for (const side of [5, -5]) g.lineTo(tip[0] + side * ahead[1], tip[1] - side * ahead[0])
       g.fill()
     }
-  }
-
-  /** The forces on one disk, weight first, joined into a polygon that closes. */
-  drawPolygon(disk, F) {
-    const { context: g, body, look } = this, forces = [[body.load[3 * disk], body.load[3 * disk + 1], look.weight]]
-    for (const { contact, disk: touched, inward, across } of this.ends()) {
-      if (touched !== disk || F[2 * contact] < 1e-9) continue
-      const [n, t] = [F[2 * contact], F[2 * contact + 1]]
-      forces.push([n * inward[0] + t * across[0], n * inward[1] + t * across[1], look.contacts.has(contact) ? look.hand : look.cold])
-    }
-    let [sx, sy] = [0, 0], corners = [[0, 0]]
-    for (const [x, y] of forces) corners.push([(sx += x), (sy += y)])
-    const xs = corners.map((p) => p[0]), ys = corners.map((p) => p[1]), side = Math.min(150, 0.32 * this.easel.wide)
-    const span = Math.max(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys), 1e-9)
-    const highest = this.ends().reduce((one, other) => (other.at[1] > one.at[1] ? other : one)) // its label is to be read
-    const right = this.px(...highest.at)[0] < this.easel.wide / 2
-    const unit = (side - 34) / span, left = right ? this.easel.wide - side - 8 : 8, top = 8
-    g.fillStyle = look.paper
-    g.strokeStyle = look.edge
-    g.lineWidth = 1
-    g.beginPath()
-    g.roundRect(left, top, side, side + 18, 6)
-    g.fill()
-    g.stroke()
-    g.fillStyle = look.ink
-    g.font = "11px sans-serif"
-    g.textAlign = "center"
-    g.textBaseline = "alphabetic"
-    g.fillText(body.scene.r.length > 1 ? `forces on ${body.scene.one} ${disk + 1} close` : "its forces close: balance", left + side / 2, top + side + 12)
-    const x0 = left + 17 - unit * Math.min(...xs) + ((side - 34) - unit * (Math.max(...xs) - Math.min(...xs))) / 2
-    const y0 = top + 17 + unit * Math.max(...ys) + ((side - 34) - unit * (Math.max(...ys) - Math.min(...ys))) / 2
-    const pixels = this.unit * this.forceUnit
-    forces.forEach(([x, y, colour], k) => {
-      this.arrow(x0 + unit * corners[k][0], y0 - unit * corners[k][1], [(x * unit) / pixels, (y * unit) / pixels], colour, 2)
-    })
   }
 
   // Pointer

@@ -7,20 +7,19 @@ import { axisForce, drawAxis, drawSegment, signOf } from "./line.js"
 import { circle, line, polygon, unflat } from "../../browser/canvas_paths.js"
 import { drawName, readBy } from "./axis_readings.js"
 import { drawShadow } from "./shadow.js"
-import { drawInterval, drawSolid } from "./solid.js"
+import { drawSolid } from "./solid.js"
 
 const TURN = 0.008 // radians per pixel
-// Pixels left and right of S, and above and below it, for labels, by the number of dimensions.
-const BESIDE = [[46, 46], [95, 46], [110, 50], [30, 30], [60, 24]]
+const BESIDE = 56, ABOVE = 44 // pixels left and right of S, and above and below it, for words
 const FLOOR = 46, ASIDE = 72 // the same for S over two forces, for their axes
 const ON = 34 // pixels of an arrow where S is unbounded
 const DRAWS = 700, WORK = 3e7 // draws from S, fewer if that takes more than WORK multiplications
 
 export class Space {
-  constructor(canvas, handler, ratio) {
+  constructor(canvas, handler) {
     this.handler = handler
     this.canvas = canvas
-    this.easel = new Easel(canvas, ratio)
+    this.easel = new Easel(canvas)
     this.view = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     this.turn(0.6, -0.5)
     this.half = 0
@@ -110,8 +109,8 @@ export class Space {
 
   /** Half the width and height available to S, which leaves room for words. */
   get room() {
-    const w = this.easel.wide - this.aside, h = this.easel.high - this.floor, [x, y] = BESIDE[Math.min(this.body.h, 4)]
-    return [w / 2 - Math.min(x, 0.33 * w), h / 2 - Math.min(y, 0.2 * h)]
+    const w = this.easel.wide - this.aside, h = this.easel.high - this.floor
+    return [w / 2 - Math.min(BESIDE, 0.33 * w), h / 2 - Math.min(ABOVE, 0.2 * h)]
   }
 
   /** Pixels per unit of force. */
@@ -174,7 +173,6 @@ export class Space {
     this.body = body
     this.look = look
     this.labels = []
-    this.taken = [] // places of words: those of the longest sides of a polygon come first
     this.easel.measure()
     const moves = !body.scene.idle && !body.empty && this.frame(this.sceneDrawn !== body.scene)
     this.easel.begin(look.paper, this.standing(), () => {
@@ -194,7 +192,7 @@ export class Space {
     }
     if (body.h === 2) this.drawPolygon()
     if (body.h === 3) drawSolid(this)
-    if (body.h === 3 && look.contact !== null) drawInterval(this, look.contact)
+    this.writeEvents()
     this.drawPath(path)
     const [x, y] = this.px(this.flat(body.u))
     circle(g, [x, y], 8)
@@ -272,8 +270,16 @@ export class Space {
     g.fill()
   }
 
-  lit(side) {
-    return this.look.side === side.corners.join() || side.stops.some(([c]) => this.look.contacts.has(c))
+  /** Whether a side is pointed at, is that of a selected contact, or has the point on it. */
+  lit({ corners, stops, slope, rest }) {
+    const { look, body } = this
+    return look.side === corners.join() || stops.some(([c]) => look.contacts.has(c)) || dot(slope, body.u) + rest < 1e-6 * body.scaleOf()
+  }
+
+  /** What happens at the lit sides, above S. */
+  writeEvents() {
+    const { body, easel, look } = this
+    for (const [k, side] of (body.whole && body.corners.length > 1 ? body.sides : []).filter((one) => this.lit(one)).entries()) this.write(easel.wide / 2, 16 + 17 * k, side.cap ? "no end this way" : this.handler("words", side), look.hand)
   }
 
   drawPolygon() {
@@ -285,8 +291,7 @@ export class Space {
     polygon(g, order.map((k) => places[k]))
     g.fillStyle = look.shade
     g.fill()
-    const size = (side) => { const [a, b] = [side.corners[0], side.corners.at(-1)].map((k) => places[k]); return Math.hypot(a[0] - b[0], a[1] - b[1]) }
-    for (const side of [...body.sides].sort((one, other) => size(other) - size(one))) {
+    for (const side of body.sides) {
       const [a, b] = [places[side.corners[0]], places[side.corners.at(-1)]], lit = this.lit(side)
       g.strokeStyle = lit ? look.hand : look.cold
       g.lineWidth = lit ? 5 : 2.5
@@ -294,55 +299,10 @@ export class Space {
       line(g, a, b)
       g.setLineDash([])
       if (side.cap) for (const part of [0, 0.5, 1]) this.drawOn([0, 1].map((d) => a[d] + part * (b[d] - a[d])), 2)
-      const [x, y] = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], long = Math.hypot(a[0] - b[0], a[1] - b[1]) || 1
-      const normal = [(a[1] - b[1]) / long, (b[0] - a[0]) / long] // outwards
-      const out = Math.sign(normal[0] * (x - middle[0]) + normal[1] * (y - middle[1])) || 1, [ux, uy] = normal.map((v) => v * out)
-      const text = side.cap ? "no end this way" : this.handler("words", side)
-      g.font = "13px sans-serif"
-      // Words next to it, in short lines, if they would be illegible along it or are longer than
-      // it.
-      const upright = Math.abs(uy) < 0.64 || (Math.abs(ux) > 0.5 && 0.6 * g.measureText(text).width > long)
-      const short = g.measureText(text).width <= (upright ? BESIDE[2][0] - 20 : long - 8)
-      const inLines = (beside) => text.replace(/ (at|between) /, "\n$1 ").replace(beside ? /^([a-z]+ \d+) / : /^$/, "$1\n")
-      const words = short ? text : inLines(upright)
-      const on = side.cap ? ON : 0
-      if ((long > 14 || lit) && !this.besides(x + on * ux, y + on * uy, ux, uy, words, lit, !upright) && !upright) {
-        const way = Math.sign(x - middle[0]) || 1 // next to it, without room along it
-        this.besides(x + (way * long) / 2, y + 28, way, 0, inLines(true), lit, false)
-      }
       this.labels.push({ side, a, b, reach: 14 })
     }
     if (places.length < 3) return // or a line among two dimensions
     drawName(this, places, middle)
-  }
-
-  /** Words outside a side at (x, y), u its normal: along it, or next to it; returns whether there was room. */
-  besides(x, y, ux, uy, text, lit, along) {
-    const { context: g, look } = this, lines = text.split("\n"), high = 12 + 7 * (lines.length - 1)
-    const wide = Math.max(...lines.map((line) => g.measureText(line).width))
-    const at = along ? [x + high * ux, y + high * uy] : [x + Math.sign(ux) * (12 + 0.5 * wide + high * Math.abs(uy)), y]
-    const angle = along ? Math.atan(-ux / uy) : 0
-    if (!this.free(at, wide, 16 * lines.length, angle) && !lit) return false
-    if (!along) at[0] = Math.min(Math.max(at[0], wide / 2 + 4), this.easel.wide - wide / 2 - 4)
-    g.save()
-    g.translate(...at)
-    g.rotate(angle)
-    this.write(0, 0, text, lit ? look.hand : look.ink, 13, "middle")
-    g.restore()
-    return true
-  }
-
-  /** Whether the place of these words at this angle is free; if so, it is reserved. */
-  free([x, y], wide, high, angle = 0) {
-    const count = Math.max(1, Math.round(wide / high)), [cos, sin] = [Math.cos(angle), Math.sin(angle)] // approximately squares
-    const parts = Array.from({ length: count }, (_, k) => {
-      const along = wide * ((k + 0.5) / count - 0.5), part = wide / count
-      return { x: x + along * cos, y: y + along * sin, wide: part * cos + high * Math.abs(sin), high: part * Math.abs(sin) + high * cos }
-    })
-    const meets = (a, b) => Math.abs(a.x - b.x) < 0.48 * (a.wide + b.wide) && Math.abs(a.y - b.y) < 0.48 * (a.high + b.high)
-    if (parts.some((a) => this.taken.some((b) => meets(a, b)))) return false
-    this.taken.push(...parts)
-    return true
   }
 
   corners() { return unflat(this.outline.points) ?? [] }

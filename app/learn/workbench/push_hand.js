@@ -1,6 +1,5 @@
 // A push on a disk, by dragging or by arrow keys, and its largest value, the limit load.
 
-import { Body } from "../model/polytope.js"
 import { number } from "../model/sentences.js"
 
 const HOW = "Drag a disk, or choose one with N and push with the arrow keys: S shrinks until nothing balances. Press the button again to let go."
@@ -44,8 +43,7 @@ export class PushHand {
   push(hand, disk, force) {
     Object.assign(this, { disk, force })
     hand.load(this.loads(hand.scene, force))
-    const { whole, scene } = hand.body
-    this.tell(hand, whole ? this.limit(hand.body) : scene.box[0] ? 0 : null) // nothing balances a push in a periodic box
+    this.tell(hand, hand.scene.box[0] ? 0 : null) // nothing balances a push in a periodic box
   }
 
   /** Say the push and the largest one; null: not known yet. */
@@ -69,19 +67,5 @@ export class PushHand {
     if (most === null) return `You push disk ${this.disk + 1} with ${number(size)}. Finding the largest push …`
     const end = Number.isFinite(most) ? `at most ${number(most)} can be borne this way (the limit load)` : "no push this way is too large: it only presses the disks against their walls"
     return `You push disk ${this.disk + 1} with ${number(size)}: ${end}.${body.empty || size > most ? " Now nothing balances." : ""}`
-  }
-
-  /** The largest push in this direction with a nonempty S, by bisection; Infinity if unbounded. */
-  limit(body) {
-    const trial = new Body(body.scene), size = Math.hypot(...this.force)
-    const holds = (F) => {
-      trial.load = this.loads(body.scene, this.force.map((v) => (v * F) / size))
-      trial.reload()
-      return !trial.cut(body.mu).empty
-    }
-    let [low, high] = [0, 64 * trial.scaleOf()]
-    if (holds(high)) return Infinity
-    for (let k = 0; k < 22; k++) { const F = (low + high) / 2; if (holds(F)) low = F; else high = F }
-    return low
   }
 }

@@ -103,27 +103,6 @@ def test_a_walk_that_holds_two_forces_changes_the_others(run):
     assert held < 1e-9 and moved > 0.1 and least > -1e-9
 
 
-def test_a_push_has_the_limit_load_of_the_library(run):
-    """Upon the top of a pyramid, sideways."""
-    limit, empty = run(
-        "learn/model/scene_in_hand learn/workbench/push_hand",
-        """({ SceneInHand, PushHand }, { scene }) => {
-            const hand = new SceneInHand(scene, () => {}), push = new PushHand()
-            push.push(hand, 2, [0.01, 0])
-            const limit = push.limit(hand.body)
-            push.push(hand, 2, [1.001 * limit, 0])
-            return [limit, hand.body.empty]
-        }""",
-        scene=drawn("pyramid", 0.4),
-    )
-    packing = small_scenes.packing_of("pyramid", 0.4)
-    loads = packing.load[:3].copy()
-    loads[2, 0] = 0.999 * limit
-    assert empty and not len(small_scenes.falling(packing, loads.ravel()))
-    loads[2, 0] = 1.001 * limit
-    assert len(small_scenes.falling(packing, loads.ravel()))
-
-
 def test_a_pull_is_undone(run):
     before, pulled, after = run(
         "learn/model/scene_in_hand",
