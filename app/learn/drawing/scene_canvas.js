@@ -13,6 +13,12 @@ const LEAN = 0.42, WORDS = 90 // of the picture without this many px: the same o
 const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // positions of the number: the centre, and around it
 const NAMED = 3 // most disks, and most contacts of a single one, for which the numbered components of forces are drawn
 
+/** Whether a scene is so much taller than wide that it needs a tall picture. */
+export function tall({ name, x, box }) {
+  const extent = (k) => { const all = x.filter((_, n) => n % 2 === k); return Math.max(...all) - Math.min(...all) }
+  return name !== "own" && !box[0] && extent(1) > 4 * extent(0) && extent(0) > 0
+}
+
 export class Arrows {
   constructor(root, handler) {
     this.handler = handler // handler(what, …): called for pointer events
@@ -50,7 +56,7 @@ export class Arrows {
     if (box[0]) { xs.splice(0, Infinity, 0, box[0]); ys.splice(0, Infinity, 0, box[1]) }
     const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)]
     const { wide: width, high: height } = this.easel
-    const rooms = [0.1, box[0] ? 0.12 : 0.1]
+    const rooms = [0.1, tall(scene) ? 0.02 : box[0] ? 0.12 : 0.1]
     const [across, up] = [right - left, high - low].map((size, k) => size * (1 + 2 * rooms[k]))
     this.unit = Math.min(width / across, height / up)
     this.unit = Math.min(this.unit, (this.outline(0) ? LEAN * (Math.min(width, height) - WORDS) : LONG * Math.min(width, height)) / Math.max(...r))

@@ -127,26 +127,10 @@ export function sentence(body, mu, now) {
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
   if (h > 3) return `Every point of S (the set of all solutions) is one set of forces that holds them. S has ${h} dimensions, so the plot shows its shadow: only the green and the violet force. Wherever you drag the red dot in it, the other forces change just enough to keep every disk in balance.`
-  const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
-  const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
   const opens = body.sides.some(({ stops }) => stops.some(([, what]) => what === OPENS))
   const limit = `${["", "an end", "a side", "a face"][h]}: there, a contact is about to slip${opens ? " or open" : ""}`
   const every = `Every point of the blue ${["", "line", "polygon", "body"][h]} S (the set of all solutions) is one set of forces that holds the same ${several ? "disks" : "disk"} at rest.`
-  const grips = gripped(body) ? " Here friction points down the walls, as if the disk had been pressed in; it can point up, too." : ""
-  const wedged = several && wedges(body) ? " Wedged between the walls, disks can press with more than their weight." : ""
-  return `${every} Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
-}
-
-/** Whether a normal force can exceed the weight of all disks. */
-function wedges(body) {
-  const { load, r } = body.scene, weight = Array.from(r).reduce((sum, _, d) => sum + Math.hypot(load[3 * d], load[3 * d + 1]), 0)
-  return weight > 0 && Array.from({ length: body.count }, (_, c) => body.interval(2 * c)[1]).some((most) => most > 1.5 * weight)
-}
-
-/** Whether friction on a disk between two walls points down at both, as it can only there. */
-function gripped(body) {
-  const { scene } = body, F = body.forces(), between = body.sides.find((side) => stopping(body, side).startsWith("friction pushes the disk down"))
-  return between?.stops.every(([c]) => -F[2 * c + 1] * scene.normal[2 * c] < -1e-9)
+  return `${every} Drag the point to ${limit}. Or drag an arrow.`
 }
 
 /** Why S is empty: the disks and walls that give way in the motion that proves it, and a sufficient friction. */

@@ -6,7 +6,7 @@ import { sceneOptions, sceneQuery } from "../../browser/scene_options.js"
 import { ask } from "../../browser/send.js"
 import { Bars } from "../drawing/bars.js"
 import { palette } from "../drawing/palette.js"
-import { Arrows } from "../drawing/scene_canvas.js"
+import { Arrows, tall } from "../drawing/scene_canvas.js"
 import { Space } from "../drawing/space.js"
 import { SceneInHand } from "../model/scene_in_hand.js"
 import { barred, counted, forceName, legend, pictured, sentence, special, stopping } from "../model/sentences.js"
@@ -134,9 +134,10 @@ class Workbench {
     space.shadow = this.axes.show(body, (force) => forceName(scene, force))
     if (this.filled) space.fill()
     this.part("name").value = scene.name
-    this.part("ranges").open = body.count <= FEW
+    this.part("ranges").open = body.count <= FEW || tall(scene)
     this.root.classList.toggle("explained", Boolean(scene.box[0]) || buildable)
     this.root.classList.toggle("building", buildable)
+    this.root.classList.toggle("tall", tall(scene))
     this.address.returning = false
     if (before && !(buildable && before.name === "own")) this.address.write(this.hand)
     this.showMu()

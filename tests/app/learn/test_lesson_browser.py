@@ -108,6 +108,11 @@ def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
         if name != "push":
             page.get_by_role("button", name="Next").click()
     expect(page.get_by_title("done")).to_have_count(8)
+    told = re.compile("^Your predictions. A ladder: 0.20, answer 0.23 to 0.3.*; Why it matters: ")
+    page.get_by_role("img", name=told).wait_for()
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Save this picture").click()
+    assert saved.value.suggested_filename == "granforce-lesson.png"
     # A finished chapter is shown with its answer again, until it is begun anew.
     for name in ("thirteen", "chance", "push"):  # of each kind of experiment one
         answer = CHAPTERS[name][2]
