@@ -3,6 +3,7 @@
 from typing import Any
 
 from bokeh.models import CustomJS, HoverTool, Title, WheelZoomTool
+from bokeh.palettes import interp_palette
 from bokeh.plotting import figure as Figure
 
 # Blue and orange are distinguishable with every common colour-vision deficiency; the middle is
@@ -36,16 +37,9 @@ legend.ncols = Math.max(1, Math.min(most, columns))
 COLOURS = 33
 
 
-def ramp(*stops: str, count: int = COLOURS) -> list[str]:
+def ramp(*stops: str) -> list[str]:
     """Colours "#rrggbb" interpolated linearly between the stops."""
-    pieces = len(stops) - 1
-    return [_mix(stops, k * pieces / (count - 1)) for k in range(count)]
-
-
-def _mix(stops: tuple[str, ...], at: float) -> str:
-    k = min(int(at), len(stops) - 2)
-    pairs = zip(bytes.fromhex(stops[k][1:]), bytes.fromhex(stops[k + 1][1:]), strict=True)
-    return "#" + "".join(f"{round(a + (b - a) * (at - k)):02x}" for a, b in pairs)
+    return list(interp_palette(stops, COLOURS))
 
 
 def palettes(dark: bool) -> dict[str, Any]:
