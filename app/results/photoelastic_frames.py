@@ -1,7 +1,7 @@
 """Photoelastic frames uploaded by a visitor: measured and inferred forces, as plain arrays."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -68,35 +68,18 @@ def measured(frame: Frame, packing: Parameters) -> Measured:
     return Measured(packing, unit * frame.measured[between, 0], frame.deviation[between, 0])
 
 
-def infer(
-    files: uploads.Files,
-    *,
-    mu: float,
-    reverse: bool = False,
-    walls: Any = None,
-    calibration: Sequence[float] | None = None,
-    number: int | None = None,
-) -> Callable[[Job], Frame]:
+def infer(files: uploads.Files, **options: Any) -> Callable[[Job], Frame]:
     """Work for jobs.Task that reads a frame and infers its forces with errors; a Frame.
 
-    files: {role: (name, content)}; mu, reverse, walls, calibration: as for `read_pegs`; number: of
-    the frame.
+    files: {role: (name, content)}; options: of `read_pegs`.
     """
 
     def work(job: Job) -> Frame:
-        LIMITS.check(mu=mu)
+        LIMITS.check(mu=options["mu"])
         job.begin("finding balanced forces close to the measured ones")
         roles = uploads.FAMILIES[uploads.family(files)][1]
         frames = open_frames(*(uploads.opened(*files[part]) for part in roles))
-        photo = read_pegs(
-            frames,
-            frame=number,
-            mu=mu,
-            reverse=reverse,
-            walls=walls,
-            calibration=calibration,
-            most_grains=LIMITS.n,
-        )
+        photo = read_pegs(frames, most_grains=LIMITS.n, **options)
         job.begin("simulating repeated measurements, for error bars")
         dataset = series.infer_frame(photo, states=DRAWS)
         names = " and ".join(name for name, _ in files.values())

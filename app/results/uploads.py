@@ -155,48 +155,27 @@ def missing(files: Files) -> list[str]:
     return [part for part in needed if part not in files]
 
 
-def read(
-    files: Files,
-    *,
-    mu: float | None = None,
-    box: tuple[float, float] | None = None,
-    tilt: float = 0.0,
-    pressure: float | None = None,
-    walls: str | None = None,
-    gravity: float = 0.0,
-    tolerance: float | None = None,
-    limits: Limits = LIMITS,
-) -> Packing:
+def read(files: Files, *, limits: Limits = LIMITS, **options: Any) -> Packing:
     """The Packing in files {role: (name, content)}.
 
-    mu: friction coefficient, which an NPZ contains; box (L_x, L_y) or None, tilt, pressure, walls,
-    gravity and tolerance: as in `read_table`; tolerance also as in `read_blocks`. Raises
-    InputError, naming file and line, for invalid files and beyond the limits.
+    options: of `read_lammps`, `read_blocks` or `read_table`. Raises InputError, naming file and
+    line, for invalid files and beyond the limits.
     """
-    if pressure is not None:
-        limits.check(pressure=pressure)
+    if "pressure" in options:
+        limits.check(pressure=options["pressure"])
     given = {part: opened(*file) for part, file in files.items()}
     if "npz" in files:
         unpacked = UNPACKED * limits.upload * 10**6
         packing = importers.load_packing(given["npz"], unpacked=unpacked, most_grains=limits.n)
     elif "particles" in files:
         packing = importers.read_lammps(
-            given["particles"], given["contacts"], mu, most_grains=limits.n
+            given["particles"], given["contacts"], most_grains=limits.n, **options
         )
     elif "bodies" in files:
-        packing = importers.read_blocks(given["bodies"], mu=mu, tolerance=tolerance)
+        packing = importers.read_blocks(given["bodies"], **options)
     else:
         packing = importers.read_table(
-            given["grains"],
-            given.get("joined"),
-            mu=mu,
-            box=box,
-            tilt=tilt,
-            pressure=pressure,
-            walls=walls,
-            gravity=gravity,
-            tolerance=tolerance,
-            most_grains=limits.n,
+            given["grains"], given.get("joined"), most_grains=limits.n, **options
         )
     limits.check(mu=packing.mu, n=len(packing.r))
     return packing

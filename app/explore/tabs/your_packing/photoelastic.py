@@ -80,7 +80,7 @@ class Frames:
         elif not self.task.running:
             self.playing = self.player.direction
             self.player.pause()
-            work = photoelastic_frames.infer(self.files, number=number, **self.options)
+            work = photoelastic_frames.infer(self.files, frame=number, **self.options)
             self.task.start(work, self._inferred)
 
     def _inferred(self, frame: Frame) -> None:
