@@ -44,7 +44,9 @@ class Limits(NamedTuple):
                 continue
             if name in ("box", "version"):
                 continue  # checked when it was given, or a parameter of the algorithm
-            words, least, most = (SHARED_NAMES if self.shared else NAMES)[name]
+            words, least, most = NAMES[name]
+            if self.shared:
+                least, most = SHARED.get(name, (least, most))
             most = getattr(self, name) if most is None else most
             if not least <= value <= most:  # also refuses NaN
                 raise InputError(
@@ -70,13 +72,10 @@ NAMES: dict[str, tuple[str, float, float | None]] = {
 }
 # At these bounds a packing takes up to about ten times as long as usual; at the others, a thousand
 # times and more.
-SHARED_NAMES = NAMES | {
-    "dt": ("the time step dt", 0.02, 1),
-    "box_mass": ("the box mass", 10, 300),
-    "sweeps": ("the number of sweeps", 1, 1000),
-    "accuracy": ("the accuracy of a step", 1e-3, 1),
-    "drag_below": ("the unbalance below which drag begins", 1e-3, 1),
-}
+SHARED: dict[str, tuple[float, float | None]] = {
+    "dt": (0.02, 1), "box_mass": (10, 300), "sweeps": (1, 1000), "accuracy": (1e-3, 1),
+    "drag_below": (1e-3, 1),
+}  # fmt: skip
 
 
 def _check_radii(text: Any) -> None:
