@@ -36,11 +36,6 @@ def module(path: Path) -> str:
     return "\n".join([*(_inside(*part) for part in parts.items()), text])
 
 
-def imported(path: Path, text: str) -> list[tuple[str, Path]]:
-    """The names that a script imports from each other script, with absolute paths."""
-    return [(names, (path.parent / other).resolve()) for names, other in IMPORT.findall(text)]
-
-
 def _gather(path: Path, parts: dict[Path, str], way: tuple[Path, ...]) -> None:
     """Fill parts {path: text} in an order in which each follows the scripts that it imports."""
     if path in way:
@@ -49,8 +44,8 @@ def _gather(path: Path, parts: dict[Path, str], way: tuple[Path, ...]) -> None:
     if path in parts:
         return
     text = path.read_text()
-    for _, other in imported(path, text):
-        _gather(other, parts, (*way, path))
+    for _, other in IMPORT.findall(text):
+        _gather((path.parent / other).resolve(), parts, (*way, path))
     parts[path] = text
 
 
@@ -61,12 +56,12 @@ def _inside(path: Path, text: str) -> str:
 
 
 def _bound(path: Path, text: str) -> str:
-    others = iter(imported(path, text))
-    return IMPORT.sub(lambda _: "const {{ {} }} = {}".format(*_named(next(others))), text)
+    """The script with its imports taken from variables."""
 
+    def bound(found: re.Match[str]) -> str:
+        return f"const {{ {found[1]} }} = {_name((path.parent / found[2]).resolve())}"
 
-def _named(one: tuple[str, Path]) -> tuple[str, str]:
-    return one[0], _name(one[1])
+    return IMPORT.sub(bound, text)
 
 
 def _name(path: Path) -> str:

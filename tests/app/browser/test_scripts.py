@@ -7,7 +7,7 @@ import re
 import subprocess
 import sys
 
-from app.browser.bundle import APP, EXPORT, IMPORT, imported
+from app.browser.bundle import APP, EXPORT, IMPORT
 
 # Names of the modules of all components, as far as the page has imported them before it is shown.
 IMPORTED = """
@@ -31,9 +31,9 @@ def test_one_script_asks_for_reduced_motion():
 
 def test_what_a_script_exports_another_one_imports():
     taken = {
-        (other, name)
+        ((path.parent / other).resolve(), name)
         for path, text in SCRIPTS.items()
-        for names, other in imported(path, text)
+        for names, other in IMPORT.findall(text)
         for name in names.split(", ")
     }
     exported = {(script, name) for script, text in SCRIPTS.items() for name in EXPORT.findall(text)}
