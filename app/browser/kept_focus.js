@@ -14,7 +14,7 @@ export function keepFocus() {
       if (now !== last) around = outwards(now)
       last = now
     } else if (last && !usable(last)) {
-      for (const part of around) if (part.isConnected && moved(part)) return
+      for (const part of around.slice(1)) if (part.isConnected && moved(part)) return
     } else last = null // the visitor clicked elsewhere
   }
 
@@ -43,10 +43,10 @@ export function focused() {
   return node
 }
 
-/** What contains an element, from the inside outwards, through shadow roots. */
-function outwards(element) {
+/** An element and what contains it, from the inside outwards, through shadow roots. */
+export function outwards(element) {
   const path = []
-  for (let node = element; (node = node.parentNode ?? node.host); ) path.push(node)
+  for (let node = element; node; node = node.parentNode ?? node.host) path.push(node)
   return path
 }
 

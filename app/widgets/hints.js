@@ -2,7 +2,7 @@
 // the chosen option of widgets.
 
 import { createElement } from "../browser/dom.js"
-import { focused } from "../browser/kept_focus.js"
+import { focused, outwards } from "../browser/kept_focus.js"
 import { plain } from "../browser/to_object.js"
 
 const WAIT_MS = 250 // before a hint opens under a resting pointer
@@ -24,18 +24,8 @@ export function render({ model }) {
     return [...new Set(keys.filter(Boolean))].slice(0, 2)
   }
 
-  /** From an element outwards, through shadow roots. */
-  function outwards(node) {
-    const path = []
-    for (let k = 0; node && k < DEEP; k++) {
-      path.push(node)
-      node = node.parentNode ?? node.host
-    }
-    return path
-  }
-
   function termsAt(path) {
-    for (const node of path) {
+    for (const node of path.slice(0, DEEP)) {
       if (!(node instanceof Element)) continue
       if (node.dataset.term) return [node, node.dataset.term.split(" ")]
       if (node.matches(WIDGETS)) {
@@ -97,7 +87,7 @@ export function render({ model }) {
     pointer = event
     if (event.pointerType === "touch" || path[0] === under) return
     under = path[0]
-    const [node] = termsAt(path.slice(0, DEEP))
+    const [node] = termsAt(path)
     if (node === at && node) return
     hide()
     if (node) rest()
@@ -111,7 +101,7 @@ export function render({ model }) {
   }
 
   function press(event) {
-    const [node, keys] = termsAt(event.composedPath().slice(0, DEEP)), touched = event.pointerType === "touch"
+    const [node, keys] = termsAt(event.composedPath()), touched = event.pointerType === "touch"
     if (!node || (touched ? node === at : !node.matches(".term"))) return hide()
     clearTimeout(waiting)
     show(node, keys)
