@@ -2,19 +2,16 @@
 // message below the server's limit; the server counts the bytes itself.
 
 import { ask } from "../browser/send.js"
+import { createElement } from "../browser/dom.js"
 
 const PIECE = 4 * 1024 * 1024
 
 export function render({ model, view }) {
-  const root = document.createElement("label")
-  root.className = "drop"
-  root.tabIndex = 0
-  root.innerHTML = `
+  const root = createElement("label", { className: "drop", tabIndex: 0, innerHTML: `
     <svg viewBox="0 0 24 24" aria-hidden="true"><path d="M12 3l5 5h-3v6h-4V8H7zM4 17h16v4H4z"/></svg>
-    <span class="what"></span><small class="status" role="status"></small>
-    <input type="file" multiple hidden>`
-  const input = root.querySelector("input"), statusLine = root.querySelector(".status")
-  const tell = (text) => { statusLine.textContent = text }
+    <span></span><small role="status"></small><input type="file" multiple hidden>` })
+  const [, what, status, input] = root.children
+  const tell = (text) => { status.textContent = text }
 
   async function send(files) {
     const chosen = [...files], size = chosen.reduce((sum, file) => sum + file.size, 0)
@@ -46,8 +43,6 @@ export function render({ model, view }) {
       if (name === "drop") send(event.dataTransfer.files)
     })
   }
-  const label = () => { root.querySelector(".what").textContent = model.label }
-  model.on("label", label)
-  label()
+  what.textContent = model.label
   return root
 }

@@ -1,23 +1,17 @@
 // A field for a whole number: typed, or changed by arrow keys and the two buttons.
 
 import { ask } from "../browser/send.js"
+import { button, createElement } from "../browser/dom.js"
 
 export function render({ model, view }) {
-  const root = document.createElement("div")
-  root.className = "number"
-  root.innerHTML = `
-    <span class="name"></span>
-    <span class="row">
-      <button type="button" tabindex="-1" aria-hidden="true" class="less">−</button>
-      <input role="spinbutton" inputmode="numeric" autocomplete="off" spellcheck="false">
-      <button type="button" tabindex="-1" aria-hidden="true" class="more">+</button>
-    </span>`
-  const part = (name) => root.querySelector(name), field = part("input")
+  const name = createElement("span", { className: "name" }), row = createElement("span", { className: "row" })
+  const root = createElement("div", { className: "number" })
+  const field = createElement("input", { role: "spinbutton", inputMode: "numeric", autocomplete: "off", spellcheck: false })
+  const [less, more] = [["−", -1], ["+", 1]].map(([sign, way]) => button(sign, () => add(way * model.step), { tabIndex: -1, ariaHidden: "true" }))
+  row.append(less, field, more)
+  root.append(name, row)
 
-  const show = () => {
-    field.value = String(model.value)
-    field.ariaValueNow = field.value
-  }
+  const show = () => { field.value = field.ariaValueNow = String(model.value) }
 
   function take() {
     const text = field.value.trim(), number = Number(text)
@@ -41,17 +35,15 @@ export function render({ model, view }) {
     take()
     add(way * model.step)
   })
-  part(".less").addEventListener("click", () => add(-model.step))
-  part(".more").addEventListener("click", () => add(model.step))
 
   const dress = () => {
-    part(".name").textContent = field.ariaLabel = model.label
+    name.textContent = field.ariaLabel = model.label
     field.ariaValueMin = String(model.start)
     field.ariaValueMax = String(model.end)
-    field.disabled = part(".less").disabled = part(".more").disabled = model.disabled
+    field.disabled = less.disabled = more.disabled = model.disabled
   }
   model.on("value", show)
-  for (const name of ["label", "disabled"]) model.on(name, dress)
+  model.on("disabled", dress)
   dress()
   show()
   return root

@@ -21,7 +21,7 @@ export function render({ model }) {
     model.value = list.value
     if (clicked) list.blur() // Space and arrows control the player again, see buttons.js
   })
-  for (const name of ["label", "options", "value"]) model.on(name, show)
+  model.on(["label", "options", "value"], show)
   show()
   return root
 }
