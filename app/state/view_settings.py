@@ -32,18 +32,8 @@ WIDTHS = {
     "measured": "measured fₙ",
 }
 # Glossary key of each quantity shown by colour or width.
-EXPLAINED = {
-    "mobilised": "mobilisation",
-    "extent": "extent",
-    "change": "change",
-    "sign": "sign",
-    "normal": "fn",
-    "difference": "difference",
-    "load": "limit_load",
-    "known": "gone",
-    "deviation": "deviation",
-    "measured": "measured",
-}
+EXPLAINED = {name: name for name in (*COLOURS, *WIDTHS)}
+EXPLAINED |= {"mobilised": "mobilisation", "normal": "fn", "load": "limit_load", "known": "gone"}
 SORTS = {
     "original": "force as packed",
     "extent": "interval ΔFₙ, seen",

@@ -176,8 +176,7 @@ def question(label: str, labels: dict[str, str], looks: Looks, name: str, **opti
 
 def linked(widget: Any, looks: Looks, name: str) -> Any:
     """A widget bound to the parameter with this name."""
-    widget.param.watch(lambda event: looks.param.update({name: event.new}), "value")
-    looks.param.watch(lambda event: widget.param.update(value=event.new), name)
+    widget.link(looks, value=name, bidirectional=True)
     return widget
 
 
