@@ -77,16 +77,8 @@ class Library:
     Shared by all visitors; its methods may be called from any thread.
     """
 
-    def __init__(
-        self,
-        shipped: str | Path | None = None,
-        cache: str | Path | None = None,
-        cells_in_memory: int = CELLS_IN_MEMORY,
-    ) -> None:
-        """shipped, cache: folders; by default $GRANFORCE_DATA or data/start.zarr, and the cache.
-
-        cells_in_memory: the number of cells kept in memory.
-        """
+    def __init__(self, shipped: str | Path | None = None, cache: str | Path | None = None) -> None:
+        """shipped, cache: folders; by default $GRANFORCE_DATA or data/start.zarr, and the cache."""
         self.notes: list[str] = []  # one line for each store that cannot be used
         shipped = shipped or os.environ.get(SHIPPED_VARIABLE) or SHIPPED
         self.shipped = self._open(shipped, readonly=True)
@@ -95,7 +87,7 @@ class Library:
         self._known: dict[tuple[Path, str], Cell | None] = {}  # of entries, which never change
         self._damaged: set[tuple[Path, str]] = set()  # entries that could not be read
         self._shown: OrderedDict[str, Shown] = OrderedDict()
-        self._cells_in_memory, self._lock = cells_in_memory, threading.Lock()
+        self._lock = threading.Lock()
 
     def _open(self, path: str | Path | None, readonly: bool) -> Store | None:
         try:
@@ -193,7 +185,7 @@ class Library:
         """Make this the newest in the cache."""
         with self._lock:
             self._shown[shown.cell.name] = shown
-            while len(self._shown) > self._cells_in_memory:
+            while len(self._shown) > CELLS_IN_MEMORY:
                 self._shown.popitem(last=False)
 
     def packing(self, params: Parameters) -> Packing:

@@ -129,33 +129,23 @@ def path(under: Any, scale: float) -> dict[str, Any]:
 
 
 def _pushed(dataset: xr.Dataset, packing: Packing, under: Any) -> Pushed:
-    scale = dataset["force_scale"].item()
-
-    def force(name: str) -> float:
-        return dataset[name].values[0].item() / scale
-
-    def count(name: str) -> int:
-        return int(dataset[name].values[0])
-
-    u = dataset["displacement"].values[0]
+    of, scale = dataset.isel(contact=0), dataset["force_scale"].item()
     distance, size = moved_grains(packing, dataset)
-    length = geometry.unit(packing)
+    length, none = geometry.unit(packing), np.zeros(under.states.shape[1], dtype=int)
     return Pushed(
-        limit=force("limit_load"),
-        low=force("critical_low"),
-        high=force("critical_high"),
-        opened=count("opened"),
-        slid=count("slid"),
-        kept=count("kept"),
+        limit=of["limit_load"].item() / scale,
+        low=of["critical_low"].item() / scale,
+        high=of["critical_high"].item() / scale,
+        opened=int(of["opened"]),
+        slid=int(of["slid"]),
+        kept=int(of["kept"]),
         path=path(under, scale),
-        displacement=np.nan_to_num(u),
-        contacts=dataset["contact_motion"].values[0]
-        if "contact_motion" in dataset
-        else np.zeros(under.states.shape[1], dtype=int),
+        displacement=np.nan_to_num(of["displacement"].values),
+        contacts=of["contact_motion"].values if "contact_motion" in of else none,
         distance=distance / length,
         size=size,
         radius=dataset["shell_radius"].values / length,
-        profile=dataset["profile"].values[0],
+        profile=of["profile"].values,
         exponent=dataset["decay_exponent"].item(),
         fit=tuple(r / length for r in json.loads(dataset.attrs["fit_range"])),
         spread=_range(dataset["fit_exponent"].values),
