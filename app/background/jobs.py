@@ -101,6 +101,7 @@ def _goes_as(job: Job, other: Job | None) -> None:
     if other is not None:
         job.stage += f": {other.stage}"
         job.fraction, job._left, job._longest = other.fraction, other.seconds_left, other._longest
+        job.so_far = other.so_far
 
 
 class Visitor(NamedTuple):
@@ -320,19 +321,20 @@ class Job:
 
     def enough(self) -> bool:
         """Whether the partial result is all that is needed; afterwards cancelling has no effect."""
-        return self._stop.is_set() and not any(turn.wanted(self) for turn in list(self.turns))
+        return self._stop.is_set() and not self._wanted
 
     def cancelled(self) -> bool:
         """Whether its end was requested."""
         return self._cancel.is_set()
 
-    def unwanted(self) -> bool:
-        """Whether its end was requested, and no other job needs what it is computing."""
-        return self.cancelled() and not any(turn.wanted(self) for turn in list(self.turns))
+    @property
+    def _wanted(self) -> bool:
+        """Whether another job needs what it is computing."""
+        return any(turn.wanted(self) for turn in list(self.turns))
 
     def _ends(self) -> bool:
         """Whether its work is to end: nobody needs it, or it exceeds the time limit."""
-        return self.unwanted() or time.monotonic() > self._until
+        return (self.cancelled() and not self._wanted) or time.monotonic() > self._until
 
     @property
     def ended(self) -> bool:

@@ -74,8 +74,8 @@ class Player {
     this.pushed = new Pushed(this)
     this.scene.onRepaint = () => { this.buttons.count(); this.split.paint(); this.tellView() }
     this.scene.describe = {
-      contact: (k) => this.look.contact(k, this.replay),
-      grain: (k) => this.look.grain(k, this.replay),
+      contact: (c) => this.look.contact(c, this.replay),
+      grain: (g) => this.look.grain(g, this.replay),
       forces: (grain) => this.look.forcesOn(grain, this.replay.mixed),
     }
   }
@@ -118,7 +118,7 @@ class Player {
     const view = this.live.leave(), place = this.grownInto(walk)
     // The visitor's own choice while a walk grew outlasts it; what played by itself ends with it.
     const chosen = place !== null && !this.playback.newest, number = playing ? this.replay.walk.number[this.replay.frame] : null
-    this.playback.halt()
+    this.playback.running = false // silently: another replay replaces this one
     this.replay = new Replay(walk.room ? roomy(walk) : walk, model.between)
     this.look = new Look(model, this.replay.walk)
     this.hand.pulled = null
@@ -174,14 +174,6 @@ class Player {
     this.tellTrack()
     this.look.measure()
     if (!this.playing) this.paintPlots()
-  }
-
-  /** Add exact bounds of the packing on screen. */
-  arrive(bounds) {
-    const { replay, plots } = this
-    if (!replay || bounds.low.length !== replay.walk.contacts ) return
-    replay.bounds = bounds
-    if (this.model.tab === "intervals") plots.showBounds(replay, this.model.scale)
   }
 
   tellTrack() { this.buttons.tellTrack(this.replay, this.grows ? 0 : this.model.keepable) }
@@ -326,10 +318,10 @@ class Player {
     const { playback, buttons } = this
     playback.newest = false
     if (!playback.running) return playback.run(true)
-    if (playback.resting === null) { if (playback.pause()) buttons.tellPlaying(false) } else {
-      playback.resume()
+    if (playback.resting !== null) { // resume after all
+      playback.resting = null
       buttons.tellPlaying(true)
-    }
+    } else if (playback.pause()) buttons.tellPlaying(false)
   }
 
   /** Start playing when the page opens, unless its link says otherwise or motion is reduced. */
@@ -344,8 +336,7 @@ class Player {
     const { model } = this, order = Array.from(normal.keys()).sort((a, b) => normal[b] - normal[a] || a - b)
     const at = order.indexOf(model.contact ?? -1), { length } = order
     model.contact = order[at < 0 ? (sign > 0 ? 0 : length - 1) : (at + sign + length) % length]
-    const row = this.scene.geometry.contact.indexOf(model.contact)
-    const [[, contact], [, n], [, t], ...others] = this.look.contact(row, this.replay)
+    const [[, contact], [, n], [, t], ...others] = this.look.contact(model.contact, this.replay)
     const intervals = others.filter(([name]) => name.startsWith("interval")).map(([name, ends]) => `; ${name.split(", ")[1]} ${ends}`)
     this.say(`contact ${contact}: fₙ ${n}, fₜ ${t}${intervals.join("")}`)
   }
@@ -387,6 +378,7 @@ class Player {
   changes() {
     const { model, scene, buttons } = this
     const loaded = (action) => () => { if (this.replay && !this.live.moves) action(this.replay) }
+    const measure = loaded(() => { this.look.measure(); this.again() })
     return {
       legend: () => buttons.tellLegend(model.legend),
       source: () => { buttons.part("source").textContent = model.source; buttons.say("") },
@@ -399,11 +391,11 @@ class Player {
       keepable: loaded(() => this.tellTrack()),
       motion: () => this.pushed.tellMotion(),
       twin: () => this.split.take(),
-      exact: loaded((replay) => { replay.bounds = null; this.look.measure(); this.again() }),
+      exact: measure,
+      loads: measure,
+      measured: measure,
+      reduction: measure,
       plane: () => { this.plots.plane = plain(model.plane); this.mark(); this.again() },
-      loads: loaded(() => { this.look.measure(); this.again() }),
-      measured: loaded(() => { this.look.measure(); this.again() }),
-      reduction: loaded(() => { this.look.measure(); this.again() }),
       between: loaded((replay) => this.retrack(replay)),
       frame: loaded((replay) => {
         if (this.playing || replay.swinging || model.frame === replay.frame) return

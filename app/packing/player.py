@@ -37,7 +37,7 @@ RAIL = NETWORKS | {"contact": int, "lower": float, "upper": float, "values": Arr
 RAIL |= {"opened": Array, "sliding": Array, "whole": bool}
 # A packing under compression: its box, disks, and contacts with their branch vectors.
 PICTURE = {"mu": float, "box": [float, ...], "tilt": float, "fraction": float, "unbalance": float}
-PICTURE |= {"x": Array, "radius": Array, "i": Array, "j": Array, "reach": Array}
+PICTURE |= {"centres": Array, "radius": Array, "i": Array, "j": Array, "reach": Array}
 PICTURE |= {"normal": Array, "tangential": Array}
 # States of a walk in progress, one after the other, each with the numbers shown next to it.
 STATES = {"normal": Array, "tangential": Array, "number": Array, "residual": Array}
@@ -75,7 +75,6 @@ class Player(Scripted, Appearance):
         {"held": None},  # there are none: the states are on screen again
         {"picture": PICTURE, "number": int},  # of a computation; `painted` answers with the number
         {"states": STATES, "number": int},
-        {"bounds": {"low": Array, "high": Array}, "number": int},
     )
 
     walk = param.Dict(
@@ -266,10 +265,6 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
 
     room: number of frames of a growing replay.
     """
-    disks, links = replay.disks, replay.links
-    whole = {"contact", "i", "j"}
-    radius = np.zeros(1 + max(of.max() for of in (disks.grain, links.i, links.j)))  # 0: of walls
-    radius[disks.grain] = disks.r
     return {
         "normal": replay.normal.ravel(),
         "tangential": replay.tangential.ravel(),
@@ -289,21 +284,14 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
         "tilt": replay.tilt,
         "window": list(replay.window),
         "inviting": replay.inviting,
+        "centres": replay.centres.ravel(),
+        "radius": replay.radius,
+        "i": replay.i.astype(np.int32),
+        "j": replay.j.astype(np.int32),
+        "begin": replay.begin.ravel(),
+        "reach": replay.reach.ravel(),
         "origin": worded(replay, "as packed"),
-        "x": disks.x,
-        "y": disks.y,
-        "r": disks.r,
-        "grain": disks.grain.astype(np.int32),
-        "touching": disks.contacts.astype(np.int32),
-        # rows of the style's disk colours: whole, rattler, image, image of a rattler
-        "kind": (2 * disks.image + (disks.contacts == 0)).astype(np.int8),
-        "radius": radius,
         "unit": replay.unit,
         "outlines": replay.outlines,
         "walls": replay.walls.ravel(),
-        "bodies": replay.bodies,
-        **{
-            name: values.astype(np.int32) if name in whole else values
-            for name, values in links._asdict().items()
-        },
     }

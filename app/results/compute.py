@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from granforce.live import hulls
@@ -15,6 +16,7 @@ from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.cells import Kind
 from granforce.study.keys import Parameters
+from granforce.types import Floats
 
 from ..background.jobs import Job, Work, in_turn
 from . import durations, progress_feed
@@ -132,15 +134,26 @@ def _watched(job: Job, selection: Selection, params: Parameters) -> dict[str, An
 
 
 def exact(library: Library, shown: Shown) -> Work:
-    """Work that computes the exact intervals for the states shown; returns a new Shown."""
+    """Work that computes the exact intervals for the states shown; returns a new Shown.
+
+    Its partial result is {"low", "high": (N_c,)} of f_n in ⟨f_n⟩; NaN for bounds still to come.
+    """
     params = shown.cell.selection.intervals
 
     def work(job: Job) -> Shown:
         replay = shown.replay
-        bounding = progress_feed.shared(progress_feed.Bounding, params)
+        found: dict[str, Floats] = {
+            side: np.full(len(replay.backbone), np.nan) for side in ("low", "high")
+        }
+
+        def watch(bound: Any) -> None:
+            job.so_far = found
+            if bound.component == 0:
+                place = np.searchsorted(replay.backbone, bound.contact)
+                found["high" if bound.side else "low"][place] = bound.value / replay.force_scale
+
         dataset = load_or_compute(
-            library, job, "exact intervals, widest first", kinds.INTERVALS, params,
-            begun=bounding.restart, watch=bounding.add,
+            library, job, "exact intervals, widest first", kinds.INTERVALS, params, watch=watch,
             widths=replay.high[:, 0] - replay.low[:, 0],
         )  # fmt: skip
         result = Shown(shown.cell, shown.replay, dataset)

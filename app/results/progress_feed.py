@@ -31,14 +31,13 @@ PICTURE_BYTES = 16e6  # of the recorded pictures of one compaction
 BEHIND = 12  # pictures; for each multiple of this that a page is behind, it skips one more
 BATCH = 64  # states sent at a time
 ENOUGH = 256  # states used to compute axes of force space during a walk
-BOUNDS_S = 0.25  # s between two messages with exact bounds, each of which redraws static parts
 
 _shared: WeakValueDictionary[tuple[str, str], Any] = WeakValueDictionary()
 _lock = threading.Lock()
 
 
 def shared(kind: type[Kind], params: Parameters) -> Kind:
-    """The shared Compaction, Walking or Bounding of these parameters."""
+    """The shared Compaction or Walking of these parameters."""
     with _lock:
         key = kind.__name__, repr(params)
         feed = _shared.get(key)
@@ -96,7 +95,7 @@ def _picture(glimpse: Any) -> Message:
     return {
         "box": [float(side) for side in glimpse.box],
         "tilt": float(glimpse.tilt),
-        "x": glimpse.x.astype(np.float32).ravel(),
+        "centres": glimpse.x.astype(np.float32).ravel(),
         "radius": glimpse.r.astype(np.float32),
         "i": glimpse.i.astype(np.int32),
         "j": glimpse.j.astype(np.int32),
@@ -135,46 +134,6 @@ class Walking:
             return
         numbers = self._count, accepted.residual, *grown
         self.parts.append((state.astype(np.float32), numbers))
-
-
-class Bounding:
-    """Exact bounds of f_n in progress; NaN for bounds still to come."""
-
-    def __init__(self) -> None:
-        self.version = 0  # number of changes
-        self.low = self.high = np.zeros(0, np.float32)
-
-    def restart(self, S: Any) -> None:
-        """Start again, on an ensemble."""
-        self._place = {int(contact): k for k, contact in enumerate(S.index)}
-        self._scale = S.force_scale
-        self.low, self.high = np.full((2, len(S.index)), np.nan, dtype=np.float32)
-        self.version += 1
-
-    def add(self, bound: Any) -> None:
-        """Record a Bound if it is one of f_n."""
-        if bound.component == 0:
-            side = self.high if bound.side else self.low
-            side[self._place[bound.contact]] = bound.value / self._scale
-            self.version += 1
-
-
-class Arriving:
-    """The part of a Bounding that one page has received."""
-
-    def __init__(self, params: Parameters) -> None:
-        """params: the parameters of the exact intervals."""
-        self._bounding = shared(Bounding, params)
-        self._sent, self._at = 0, -np.inf
-
-    def next(self) -> Message | None:
-        """The next message, or None: {"bounds": {"low", "high": (N_c,)}}, in ⟨f_n⟩."""
-        bounding, now = self._bounding, time.perf_counter()
-        version = bounding.version
-        if version == self._sent or now < self._at + BOUNDS_S or not len(bounding.low):
-            return None
-        self._sent, self._at = version, now
-        return {"bounds": {"low": bounding.low.copy(), "high": bounding.high.copy()}}
 
 
 def every(summary: Summary) -> int:

@@ -15,7 +15,7 @@ from ..background.limits import LIMITS
 from ..background.notifications import as_one, observe
 from ..results import compute, durations
 from ..results.library import Cell, Library, Shown, best_cell, cell_of, nearest_cell, with_states
-from ..results.progress_feed import Arriving, Following, numbers
+from ..results.progress_feed import Following, numbers
 from ..results.replays import Replay
 from ..results.selection import Selection, brief, command
 from . import known, perturbations
@@ -458,7 +458,8 @@ class AppState(param.Parameterized):
     def compute(self) -> None:
         """Compute the selected states in the background, and show them as they are found."""
         selection = self.selection
-        if selection is None or self.work.computes(selection):
+        live = self.work.live if self.work.computation.running else None
+        if selection is None or (live and live.selection == selection):
             return
         self.work.message = ""
         try:
@@ -536,7 +537,7 @@ class AppState(param.Parameterized):
             self.param.update(shown=replay, plane=None, source=source, motion=None)
             self._look(self._new_view(selection) | {"contact": contact})
 
-    def follow(self) -> Following | Arriving | None:
+    def follow(self) -> Following | None:
         """The computation in progress, from `work`; if it failed, the previous view returns."""
         with as_one(*self.parts, self.work, self):
             if self.work.live is not None and not self.work.computation.running:

@@ -222,14 +222,8 @@ class Knowledge(param.Parameterized):
     def whole(self) -> Narrowed | None:
         """The Narrowed of all known forces, once all its bounds exist; otherwise None."""
         narrowed: Narrowed | None = self.narrowed
-        return (
-            narrowed if self._settled and narrowed and narrowed.known == tuple(self.known) else None
-        )
-
-    @property
-    def _settled(self) -> bool:
-        """Whether all intervals for some known forces exist."""
-        return self.narrowed is not None and not self.narrowed.left
+        settled = narrowed and not narrowed.left and narrowed.known == tuple(self.known)
+        return narrowed if settled else None
 
     def _follow(self, *events: Any) -> None:
         """Update intervals for the known forces; statements belong to one packing."""
@@ -242,8 +236,7 @@ class Knowledge(param.Parameterized):
         self.ranking.cancel()
         if before != packing or not self.known:
             self.narrowed = None
-        done = self.narrowed.known if self._settled else ()
-        if self.known and cell is not None and tuple(self.known) != done:
+        if self.known and cell is not None and self.whole is None:
             self.compute()
         else:
             self.task.cancel()
@@ -251,7 +244,8 @@ class Knowledge(param.Parameterized):
     def _arrive(self, event: Any) -> None:
         """Show the intervals computed so far."""
         arriving = _so_far(self.task)
-        if event.new and arriving is not None and arriving.known == tuple(self.known):
+        # Before them come the intervals without known forces, which are not shown.
+        if event.new and isinstance(arriving, Underway) and arriving.known == tuple(self.known):
             self._narrow(arriving.narrowed)
 
     def _narrow(self, narrowed: Narrowed) -> None:
@@ -263,8 +257,8 @@ class Knowledge(param.Parameterized):
     def _failed(self, event: Any) -> None:
         """Undo conflicting statements; the message names them."""
         if event.new:
-            state = self.state
-            self.known = list(self.narrowed.known) if self._settled else []
+            state, narrowed = self.state, self.narrowed
+            self.known = list(narrowed.known) if narrowed and not narrowed.left else []
             self.work.message = f"{event.new} (here ⟨fₙ⟩ = {state.replay.force_scale:.4g})"
 
 

@@ -9,7 +9,7 @@ import param
 from ..background.jobs import Job, Pool, Task, Visitor, computing, reading
 from ..results import compute
 from ..results.library import Library, Shown
-from ..results.progress_feed import Arriving, Following
+from ..results.progress_feed import Following
 from ..results.selection import Selection
 
 
@@ -20,7 +20,7 @@ class Work(param.Parameterized):
     message = param.String(doc="one line about what went wrong, or empty")
     progress = param.Dict(default={}, doc="fraction, words and keeps of `foremost`; {}: none")
     live = param.Parameter(doc="the Following of what is being computed, or None")
-    arriving = param.Parameter(doc="the Arriving of exact intervals under way, or None")
+    arriving = param.Parameter(doc="exact bounds found so far, see compute.exact; None: no search")
     moving = param.Boolean(doc="whether a packing is on screen that is being compressed")
     fourfold = param.Integer(doc="how often the walk under way has grown fourfold: new axes")
 
@@ -38,6 +38,7 @@ class Work(param.Parameterized):
         self.computation, self.reader = self.task(), self.task(reading)
         self.loading = self.task()
         self.looking, self.measuring = self.task(reading), self.task()  # for the volume of S
+        self.computation.param.watch(self._arrive, ["running", "fraction"])
 
     # Tasks
 
@@ -122,17 +123,20 @@ class Work(param.Parameterized):
         self.param.update(live=Following(selection), arriving=None)
         self.computation.start(compute.states(library, selection), done)
 
-    def computes(self, selection: Selection) -> bool:
-        """Whether this selection is being computed."""
-        return self.computation.running and self.live and self.live.selection == selection
-
     def compute_exact(
         self, library: Library, shown: Shown, done: Callable[[Shown], object]
     ) -> None:
-        """Compute exact intervals in the background; `arriving` follows them as they are found."""
+        """Compute exact intervals in the background; `arriving` has them as they are found."""
         self.message = ""
         self.computation.start(compute.exact(library, shown), done)
-        self.arriving = Arriving(shown.cell.selection.intervals)
+        self.arriving = {}
+
+    def _arrive(self, *events: Any) -> None:
+        task = self.computation
+        if self.arriving is None or not task.running:
+            self.arriving = None
+        elif task.job is not None and task.job.so_far is not None:
+            self.arriving = {side: found.copy() for side, found in task.job.so_far.items()}
 
     def shown(self, selection: Selection) -> None:
         """These states are on screen: computations of others are no longer awaited."""
@@ -140,8 +144,8 @@ class Work(param.Parameterized):
             self.computation.cancel()
         self.param.update(live=None, moving=False, arriving=None)
 
-    def follow(self) -> Following | Arriving | None:
-        """The Following or Arriving of the current computation, or None; ended ones are dropped."""
+    def follow(self) -> Following | None:
+        """The Following of the current computation, or None; ended ones are dropped."""
         if not self.computation.running:
-            self.param.update(live=None, moving=False, arriving=None)
-        return self.live or self.arriving
+            self.param.update(live=None, moving=False)
+        return self.live

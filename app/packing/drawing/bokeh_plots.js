@@ -61,7 +61,6 @@ export class Plots {
   show(replay, scale) {
     this.replay = replay
     const bars = this.find("bars"), growth = this.find("growth"), { walk, passed } = replay
-    if (replay.bounds && bars && bars.data !== this.filled) this.fillBounds(replay, scale)
     if (bars?.get_column("at")) this.showBars(bars, replay, scale)
     if (!walk.numbers || !(growth?.get_column("state")?.length >= walk.number.length)) return
     let most = 0
@@ -83,35 +82,6 @@ export class Plots {
     if (most > range?.end) range.end = 1.25 * most
   }
 
-  /** Exact bounds so far, while others are still being computed. */
-  showBounds(replay, scale) {
-    this.fillBounds(replay, scale)
-    this.find("bars")?.change.emit()
-  }
-
-  /** Where only one bound is known, the bar ends at the value seen. */
-  fillBounds({ walk, bounds }, scale) {
-    const bars = this.find("bars"), at = bars?.get_column("at")
-    if (!at) return
-    this.filled = bars.data
-    const bottom = bars.get_column("exact_low"), top = bars.get_column("exact_high")
-    let most = 0
-    for (let k = 0; k < at.length; k++) {
-      const c = at[k], unit = scale === "own" ? walk.normal[c] : 1
-      const [low, high] = [bounds.low[c], bounds.high[c]], none = isNaN(low) && isNaN(high)
-      bottom[k] = none ? NaN : (isNaN(low) ? walk.low[c] : low) / unit
-      top[k] = none ? NaN : (isNaN(high) ? walk.high[c] : high) / unit
-      if (top[k] > most) most = top[k]
-    }
-    if (scale !== "own") this.reachBars(most)
-  }
-
-  /** Extend the axis of forces to the bars. */
-  reachBars(most) {
-    const axis = named(this.document, "bars_range")
-    if (1.04 * most > axis?.end) axis.end = 1.04 * most
-  }
-
   /** The present forces; for a walk in progress also the values seen, which otherwise do not change. */
   showBars(bars, { walk, mixed }, scale) {
     const column = (name) => bars.get_column(name)
@@ -126,7 +96,8 @@ export class Plots {
       top[k] = walk.high[c] / unit
       if (top[k] > reached) reached = top[k]
     }
-    if (grows && scale !== "own") this.reachBars(reached)
+    const axis = grows && scale !== "own" && named(this.document, "bars_range")
+    if (1.04 * reached > axis?.end) axis.end = 1.04 * reached
     this.changed(bars, "bars")
   }
 

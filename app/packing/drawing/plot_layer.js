@@ -92,7 +92,10 @@ export const LAYERS = {
     for (const name of ["eta1", "eta2", "eta3"]) {
       context.strokeStyle = plots.colours[name]
       context.lineWidth = 2
-      curve(context, state, growth.get_column(name), x, y, Math.min(passed + 1, state.length), 1)
+      const eta = growth.get_column(name), count = Math.min(passed + 1, state.length)
+      context.beginPath()
+      for (let k = 1; k < count; k++) context.lineTo(x(state[k]), y(eta[k]))
+      context.stroke()
     }
   },
 
@@ -136,12 +139,6 @@ function dots(context, xs, ys, x, y, radius) {
     context.arc(x(xs[k]), y(ys[k]), radius, 0, 2 * Math.PI)
   }
   context.fill()
-}
-
-function curve(context, xs, ys, x, y, count, from = 0) {
-  context.beginPath()
-  for (let k = from; k < count; k++) context.lineTo(x(xs[k]), y(ys[k]))
-  context.stroke()
 }
 
 /** Points that can be dragged in a plot: hand.take(k, x, y), move(x, y), leave(), in the units of the plot. */

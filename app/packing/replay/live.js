@@ -5,50 +5,23 @@ import { STILL } from "../../browser/motion.js"
 import { plain } from "../../browser/to_object.js"
 
 const GLIDE = 250 // ms of the transition from the view of the moving packing to that of the finished one
-const STRIP = 1 // width of the strip around the box in which images are drawn, in largest radii
 export const CATCH_UP = 0.6 // s by which the player stays behind the newest state
 const WIDEST = 0.7 // widest chain in a moving packing, in largest radii: collisions carry most of the force
 export const FORCES = ["normal", "tangential"]
 const MEASURES = ["residual", "eta1", "eta2", "eta3"]
 
-/** A moving packing for the scene, including its periodic images. */
-function moving({ box, tilt, x, radius, i, j, reach }) {
-  const drawn = { box, tilt, radius, touching: [], i: [], j: [], contact: [] }
-  for (const name of ["x", "y", "r", "grain", "kind", "x0", "y0", "x1", "y1"]) drawn[name] = []
-  const margin = STRIP * radius.reduce((most, r) => Math.max(most, r), 0)
-  const [wide, high] = box
-  // In a tilted cell: distances from its sides b and a; x and y in a straight one.
-  const narrow = high / Math.hypot(tilt, high), across = (px, py) => (px - (tilt * py) / high) * narrow
-  const visible = (low, up, side) => up > -margin && low < side + margin
-  const touching = new Int32Array(radius.length)
-  for (let c = 0; c < i.length; c++) { touching[i[c]]++; touching[j[c]]++ }
-  for (const s of [0, -1, 1]) for (const t of [0, -1, 1]) {
-    const a = s * wide + t * tilt, b = t * high, image = s || t ? 2 : 0
-    for (let g = 0; g < radius.length; g++) {
-      const px = x[2 * g] + a, py = x[2 * g + 1] + b, r = radius[g], at = across(px, py)
-      if (!visible(at - r, at + r, wide * narrow) || !visible(py - r, py + r, high)) continue
-      drawn.x.push(px); drawn.y.push(py); drawn.r.push(r); drawn.grain.push(g)
-      drawn.touching.push(touching[g]); drawn.kind.push(image + (touching[g] ? 0 : 1))
-    }
-    for (let c = 0; c < i.length; c++) {
-      const x0 = x[2 * i[c]] + a, y0 = x[2 * i[c] + 1] + b
-      const x1 = x0 + reach[2 * c], y1 = y0 + reach[2 * c + 1]
-      const at = across(x0, y0), to = across(x1, y1)
-      if (!visible(Math.min(at, to), Math.max(at, to), wide * narrow)) continue
-      if (!visible(Math.min(y0, y1), Math.max(y0, y1), high)) continue
-      drawn.x0.push(x0); drawn.y0.push(y0); drawn.x1.push(x1); drawn.y1.push(y1)
-      drawn.contact.push(c); drawn.i.push(i[c]); drawn.j.push(j[c])
-    }
-  }
-  const half = Math.max(wide + Math.abs(tilt), high) / 2 + margin
-  drawn.window = [(wide + tilt) / 2 - half, (wide + tilt) / 2 + half, high / 2 - half, high / 2 + half]
-  return drawn
+/** A moving packing for the scene: in its own unit and window, with lines from centre to centre. */
+function moving(picture) {
+  const { box: [wide, high], tilt, radius, i, centres } = picture
+  const unit = radius.reduce((most, r) => Math.max(most, r), 0), half = Math.max(wide + Math.abs(tilt), high) / 2 + unit
+  const window = [(wide + tilt) / 2 - half, (wide + tilt) / 2 + half, high / 2 - half, high / 2 + half]
+  const begin = Array.from(i).flatMap((grain) => [centres[2 * grain], centres[2 * grain + 1]])
+  return { ...picture, unit, window, begin }
 }
 
 /** Chains of a moving packing: width fₙ, colour mobilisation. */
-function flickering({ normal, tangential, radius, mu }, palettes, scales) {
+function flickering({ normal, tangential, unit, mu }, palettes, scales) {
   const colours = mu > 0 ? palettes.mobilised : [palettes.neutral], last = colours.length - 1
-  const unit = radius.reduce((most, r) => Math.max(most, r), 0)
   const width = normal.map((value) => unit * Math.min(WIDEST, scales.width * value))
   const bin = Int16Array.from(normal, (value, c) => {
     const part = mu > 0 && value > CARRYING ? tangential[c] / (mu * value) : 0
@@ -106,9 +79,8 @@ export class Live {
 
   /** Handle messages about a computation. */
   receive(message) {
-    const { picture, states, bounds, number } = message, { loaded, model } = this.player
+    const { picture, states, number } = message, { loaded, model } = this.player
     if (states) this.player.grow(plain(states))
-    if (bounds) this.player.arrive(plain(bounds))
     requestAnimationFrame(() => { // never in a hidden tab, which thus receives no more
       // Neither over the finished packing nor, after cancelling, over the old one, which stays
       // then.
@@ -132,7 +104,7 @@ export class Live {
     // Keep the initial size while it shrinks, and enlarge it if the tilt exceeds it.
     const half = Math.max(this.window[1] - this.window[0], right - left) / 2
     scene.view = { x: (left + right) / 2, y: (low + high) / 2, half }
-    scene.style = flickering(picture, plain(model.palettes), plain(model.scales))
+    scene.style = flickering(geometry, plain(model.palettes), plain(model.scales))
     scene.resize()
     if (scene.size) scene.repaint()
     this.pictures++

@@ -40,9 +40,6 @@ export class Playback {
     requestAnimationFrame((now) => this.tick(now))
   }
 
-  /** Stop silently: another replay replaces this one. */
-  halt() { this.running = false }
-
   /** Rest at a named network, the nearest one, except between two compared ones. */
   settle(replay) {
     if (replay.held || replay.swinging || !(replay.position % 1)) return
@@ -57,9 +54,6 @@ export class Playback {
     this.resting = Math.round(replay.position)
     return true
   }
-
-  /** Resume after all. */
-  resume() { this.resting = null }
 
   /** One step towards the resting position; returns whether it is reached. */
   rest(replay, took) {

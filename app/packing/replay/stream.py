@@ -22,7 +22,7 @@ class Stream:
         self._document = document
         self._sent = self._painted = 0  # numbers of the last messages sent, and painted
         self._visible, self._ticking = False, None
-        self.work.param.watch(self._follow, ["live", "arriving"])
+        self.work.param.watch(self._follow, "live")
         observe(self._show, state, "missing", "selection", "cell", "work.busy")
         self._follow()
 
@@ -46,10 +46,9 @@ class Stream:
     def _follow(self, *events: Any) -> None:
         self._show()
         self.player.live = self.work.live is not None
-        ticking = self.player.live or self.work.arriving is not None
-        if self._document is None or ticking == (self._ticking is not None):
+        if self._document is None or self.player.live == (self._ticking is not None):
             return
-        if ticking:
+        if self.player.live:
             tick = partial(together, self.tick)
             self._ticking = self._document.add_periodic_callback(tick, TICK_MS)
         else:
@@ -71,4 +70,4 @@ class Stream:
             self._sent += 1
             self.player.tell(news | {"number": self._sent})
             if "states" in news:
-                self.work.fourfold = following.fourfold  # type: ignore[union-attr]  # never Arriving
+                self.work.fourfold = following.fourfold

@@ -8,12 +8,11 @@ from small_store import DISKS
 from visitor import wait_for
 
 import granforce as gf
-from app.background.jobs import Job, Later, turn_of
 from app.explore.controls import Controls
 from app.explore.status_line import StatusLine
 from app.explore.tabs.export import export
 from app.packing.legend import measured
-from app.results import compute, progress_feed, uploads
+from app.results import uploads
 from app.results.library import Library
 from app.results.selection import Selection
 from app.state.app_state import AppState
@@ -139,20 +138,4 @@ def test_measured_forces_are_drawn_on_their_own_packing_only(library, imported):
     state.measured = SimpleNamespace(packing=params, force=[], off=[])
     state.ask(Selection(params, 0.3, states=STATES))
     assert state.missing and measured(state, state.replay) == {}
-    state.work.close()
-
-
-def test_who_waits_for_exact_bounds_leaves_those_under_way_alone(library, imported):
-    """Once it emptied the arrays of the computation that it waited for."""
-    state = AppState(library, query=f"?n={DISKS}&mu=0.1&relax=nearest_piqp")
-    wait_for(state)
-    shown, params = library.shown(state.cell), state.cell.selection.intervals
-    feed = progress_feed.shared(progress_feed.Bounding, params)
-    first = state.replay.backbone[0]
-    feed.restart(SimpleNamespace(index=state.replay.backbone, force_scale=2.0))
-    turn = turn_of((kinds.INTERVALS.name, params))
-    with turn.lock, pytest.raises(Later):
-        compute.exact(library, shown)(Job(lambda job: None))
-    feed.add(SimpleNamespace(component=0, side=0, contact=first, value=1.0))
-    assert feed.low[0] == 0.5
     state.work.close()

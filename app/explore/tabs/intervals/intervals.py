@@ -7,7 +7,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from ....background.notifications import observe
-from ....packing.legend import exact_intervals
+from ....packing.legend import Bounds, exact_intervals
 from ....results.replays import Replay, worded
 from ....state.app_state import AppState
 from ....state.view_settings import DRAWN, SCALES, SORTS
@@ -83,13 +83,14 @@ class View(TabView):
         narrowed, coming = state.knowledge.narrowed, state.work.arriving is not None
         exact = exact_intervals(state.possible, replay)
         before = exact_intervals(narrowed.before, replay) if exact and narrowed else {}
+        found = exact or _found(state.work.arriving or {}, replay)
         order = ordered(replay, exact, looks.sort, narrowed, coming)
         named = [one.contact for one in state.knowledge.known]
         named += [] if looks.contact is None else [looks.contact]
         ranks = picked(order.contacts, SOME if looks.drawn == "some" else MOST_BARS, named)
         relative = looks.scale == "own"
         beyond = self.drawing.show(
-            replay, order.contacts[ranks], exact, before, seen=state.obeying, relative=relative
+            replay, order.contacts[ranks], found, before, seen=state.obeying, relative=relative
         )
         self.drawing.dots.glyph.update(fill_color=now(looks.dark), line_color=now(looks.dark))
         self.drawing.mark(looks.contact)
@@ -164,6 +165,15 @@ def sentence(
     if endless:
         text += f"Pale bars up to the upper edge have no upper end: {endless}. "
     return text + "Drag a dot, or a line in the packing."
+
+
+def _found(bounds: Bounds, replay: Replay) -> Bounds:
+    """Exact bounds found so far; where only one is known, the bar ends at the value seen."""
+    none = np.isnan(list(bounds.values())).all(axis=0)
+    return {
+        side: np.where(np.isnan(found) & ~none, getattr(replay, side)[:, 0], found)
+        for side, found in bounds.items()
+    }
 
 
 def _dot(state: AppState) -> str:
