@@ -207,8 +207,7 @@ def _mean_extent(possible: xr.Dataset | None) -> str:
 
 def unborne(replay: Replay) -> str:
     """A warning if no network bears stress along a closed direction; empty if one does."""
-    links, first = replay.links, np.unique(replay.links.contact, return_index=True)[1]
-    branch = np.stack([links.x1 - links.x0, links.y1 - links.y0])[:, first]
+    branch = replay.reach.T
     normal = branch / np.hypot(*branch)
     tangent = np.stack([-normal[1], normal[0]])
     # The first network of a packing without forces may carry less than others at this μ.

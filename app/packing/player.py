@@ -288,7 +288,7 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
         "radius": replay.radius,
         "i": replay.i.astype(np.int32),
         "j": replay.j.astype(np.int32),
-        "begin": replay.begin.ravel(),
+        "starts": replay.starts.ravel(),
         "reach": replay.reach.ravel(),
         "origin": worded(replay, "as packed"),
         "unit": replay.unit,

@@ -1,13 +1,11 @@
-"""Disks and contacts with their periodic images, for drawing: plain arrays."""
-
-from typing import NamedTuple
+"""Disks and contacts, for drawing: plain arrays. Scripts add their periodic images."""
 
 import numpy as np
 
 from granforce.records import Packing
-from granforce.types import Floats, Integers, Mask
+from granforce.types import Floats, Integers
 
-# Width of the strip around the cell in which images are drawn, in units of `unit`.
+# Width of the strip around the cell in which images are drawn, in units of `unit`; see images.js.
 MARGIN = 1.0
 # Largest distance from the centre of the contact suggested for dragging, in half view widths.
 NEAR = 0.45
@@ -16,30 +14,6 @@ SHORT = 0.7  # half the length of a wall of unknown ends, in radii of the disk t
 # ⟨f_n⟩ for full colour.
 CHAIN_WIDTH, FULL_CHANGE = 0.23, 0.5
 FULL_DEVIATION = 4.0  # deviation from the measurement, in σ, for full colour
-
-
-class Disks(NamedTuple):
-    """Visible disks and periodic images, k rows."""
-
-    x: Floats  # (k,) length
-    y: Floats
-    r: Floats
-    grain: Integers  # (k,) number of the grain
-    contacts: Integers  # (k,) number of its contacts in the backbone
-    image: Mask  # (k,) bool, whether the centre is outside the cell
-
-
-class Links(NamedTuple):
-    """Contacts of the backbone and their periodic images as segments, k rows."""
-
-    # (k,) centre of grain i, length; of bodies, begin of a line through the contact along n
-    x0: Floats
-    y0: Floats
-    x1: Floats  # (k,) that centre + ℓ n, a place at a wall, or end of the line
-    y1: Floats
-    contact: Integers  # (k,) position among the backbone's contacts
-    i: Integers  # (k,) numbers of the two grains
-    j: Integers
 
 
 def bodies(packing: Packing) -> int:
@@ -93,46 +67,24 @@ def square(x: Floats, packing: Packing) -> tuple[float, float, float, float]:
     return x_low, x_high, y_low, y_high
 
 
-def inviting(links: Links, normal: Floats, window: tuple[float, ...]) -> int:
-    """Row of the strongest contact near the centre of the window, by f_n (N_c,); −1 if none."""
-    x_low, x_high, y_low, y_high = window
-    away = np.maximum(
-        np.abs(links.x0 + links.x1 - x_low - x_high), np.abs(links.y0 + links.y1 - y_low - y_high)
-    )
-    force = np.where(away < NEAR * (x_high - x_low), normal[links.contact], -1.0)
-    return int(np.argmax(force)) if force.max(initial=-1.0) >= 0 else -1
+def lines(packing: Packing, x: Floats, backbone: Integers) -> tuple[Floats, Floats]:
+    """Start and extent (N_c, 2) of the line of each contact of the backbone.
 
-
-def disks(packing: Packing, x: Floats, backbone: Integers) -> Disks:
-    """Disks; x (N, 2) centres in the cell, backbone: (N_c,) positions of its contacts."""
-    i, j = packing.contacts.i[backbone], packing.contacts.j[backbone]
-    number = np.bincount(i, minlength=len(x)) + np.bincount(j, minlength=len(x))
-    parts = []
-    x, cell = x[: bodies(packing)], packing.cell
-    r = packing.r[: len(x), None]
-    at = cell.across(x)
-    for moved, grain in cell.images(at - r, at + r, MARGIN * unit(packing)):
-        image = np.full(len(grain), bool(np.any(moved)))
-        place = x[grain] + moved
-        parts.append((*place.T, packing.r[grain], grain, number[grain], image))
-    return Disks(*(np.concatenate(field) for field in zip(*parts, strict=True)))
-
-
-def links(packing: Packing, x: Floats, backbone: Integers) -> Links:
-    """Segments of the backbone's contacts, given as positions in the packing."""
-    i, j = packing.contacts.i[backbone], packing.contacts.j[backbone]
-    c = packing.contacts.picked(backbone)
-    begin, long = x[i], np.where(j < bodies(packing), c.length, c.arm_i)  # to a wall, not behind it
-    reach = long[:, None] * c.normal
+    From the centre of grain i to that of j, or to a wall; of bodies, through the contact along n.
+    """
     if packing.shapes is not None:
-        begin, reach = packing.through_contacts(backbone, np.tile([1.0, 0.0], (len(backbone), 1)))
-    parts = []
-    # A contact of a disk inside the cell may extend outside, and its image then enters the cell.
-    cell = packing.cell
-    end = begin + reach
-    ends = cell.across(begin), cell.across(end)
-    low, high = np.minimum(*ends), np.maximum(*ends)
-    for moved, contact in cell.images(low, high, MARGIN * unit(packing)):
-        placed = (*(begin[contact] + moved).T, *(begin[contact] + moved + reach[contact]).T)
-        parts.append((*placed, contact, i[contact], j[contact]))
-    return Links(*(np.concatenate(field) for field in zip(*parts, strict=True)))
+        return packing.through_contacts(backbone, np.tile([1.0, 0.0], (len(backbone), 1)))
+    c = packing.contacts.picked(backbone)
+    length = np.where(c.j < bodies(packing), c.length, c.arm_i)  # to a wall, not behind it
+    return x[c.i], length[:, None] * c.normal
+
+
+def inviting(middles: Floats, normal: Floats, window: tuple[float, ...]) -> int | None:
+    """The strongest contact near the centre of the window, by f_n (N_c,); None without one.
+
+    middles (N_c, 2): of the lines.
+    """
+    x_low, x_high, y_low, y_high = window
+    away = np.abs(2 * middles - [x_low + x_high, y_low + y_high]).max(axis=1)
+    force = np.where(away < NEAR * (x_high - x_low), normal, -1.0)
+    return int(np.argmax(force)) if force.max(initial=-1.0) >= 0 else None

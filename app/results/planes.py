@@ -99,8 +99,7 @@ def strong_pair(replay: Replay) -> tuple[int, int]:
     if replay.normal.shape[1] < 2:
         raise InputError("there are not two contacts to compare")
     strong = np.argsort(-replay.normal[0], kind="stable")
-    disks = np.zeros((len(strong), 2), dtype=int)
-    disks[replay.links.contact] = np.column_stack([replay.links.i, replay.links.j])
+    disks = np.column_stack([replay.i, replay.j])
     apart = ~np.isin(disks[strong], disks[strong[0]]).any(axis=1)
     other = strong[apart][0] if apart.any() else strong[1]
     return int(strong[0]), int(other)
@@ -152,12 +151,7 @@ def _spelled(components: Components) -> str:
 
 def renumbered(name: str, number: Callable[[int], int]) -> str:
     """The name of a plane with each contact renumbered."""
-    positions = read(name)
-    return (
-        _spelled(tuple((number(contact), part) for contact, part in positions))
-        if positions
-        else name
-    )
+    return _spelled(tuple((number(contact), part) for contact, part in read(name))) or name
 
 
 def read(text: str) -> Components:

@@ -18,16 +18,19 @@ FRAME_BYTES = 8e6  # of the frames sent to a page
 class Replay(NamedTuple):
     """States to show: geometry, frames and numbers. Forces are in ⟨f_n⟩."""
 
-    disks: geometry.Disks
-    links: geometry.Links
+    centres: Floats  # (bodies, 2) in the cell, length
+    radius: Floats  # (N,) 0 of what is behind walls
+    i: Integers  # (N_c,) grains of the contacts
+    j: Integers
+    starts: Floats  # (N_c, 2) geometry.lines
+    reach: Floats
     box: Floats  # (2,) sides; inf in open directions
     tilt: float  # of the cell
     window: tuple[float, float, float, float]  # x_low, x_high, y_low, y_high of the view, a square
     unit: float  # geometry.unit, the scale of chains and marks, length
     outlines: list[list[float]]  # geometry.outlines
     walls: Floats  # (k, 4) geometry.walls
-    bodies: int  # geometry.bodies
-    inviting: int  # row of links suggested for dragging, or -1
+    inviting: int | None  # contact suggested for dragging
     backbone: Integers  # (N_c,) positions of the contacts in the packing
     contact_normals: Floats  # (N_c, 2) n, from grain i to j
     contact_points: Floats  # (N_c, 2) at their image in the cell, length
@@ -45,11 +48,6 @@ class Replay(NamedTuple):
     order: Integers  # (N_c,) contacts by original f_n, ascending
     sampling: measures.Sampling  # of the states shown
     summary: dict[str, Any]  # plain numbers of the states, by schema name
-
-    @property
-    def invited(self) -> int | None:
-        """The contact of the row `inviting`, or None."""
-        return None if self.inviting < 0 else int(self.links.contact[self.inviting])
 
 
 def worded(replay: Replay, text: str) -> str:
@@ -131,23 +129,28 @@ def _replay(
 ) -> Replay:
     """The Replay of frames (F, N_c, 2), float32, the original network first."""
     x = packing.cell.wrapped(packing.x)
-    links, window = geometry.links(packing, x, backbone), geometry.square(x, packing)
+    count, contacts = geometry.bodies(packing), packing.contacts.picked(backbone)
+    starts, reach = geometry.lines(packing, x, backbone)
+    window = geometry.square(x, packing)
     return Replay(
-        disks=geometry.disks(packing, x, backbone),
-        links=links,
+        centres=x[:count],
+        radius=np.append(packing.r[:count], np.zeros(len(packing.r) - count)),
+        i=contacts.i,
+        j=contacts.j,
+        starts=starts,
+        reach=reach,
         box=packing.box,
         tilt=packing.tilt,
         window=window,
         unit=geometry.unit(packing),
         outlines=geometry.outlines(packing),
         walls=geometry.walls(packing, backbone),
-        bodies=geometry.bodies(packing),
-        inviting=geometry.inviting(links, frames[0, :, 0], window),
+        inviting=geometry.inviting(starts + reach / 2, frames[0, :, 0], window),
         backbone=backbone,
-        contact_normals=packing.contacts.normal[backbone],
+        contact_normals=contacts.normal,
         contact_points=packing.contact_points[backbone],
         at_walls=packing.touch_walls[backbone],
-        friction=packing.contacts.picked(backbone).friction(numbers["summary"]["mu"]),
+        friction=contacts.friction(numbers["summary"]["mu"]),
         force_scale=scale,
         given=packing.info.get("forces") != "found",
         normal=np.ascontiguousarray(frames[..., 0]),

@@ -30,11 +30,9 @@ class Place(NamedTuple):
         if packing == self.packing:
             found = np.flatnonzero(replay.backbone == self.replay.backbone[self.contact])
         elif "n" in packing and all(packing.get(k) == self.packing.get(k) for k in DISKS):
-            here, there = self.replay.links, replay.links
-            row = np.flatnonzero(here.contact == self.contact)[0]
-            pairs = np.sort([there.i, there.j], axis=0)
-            same = pairs == np.sort([here.i[row], here.j[row]])[:, None]
-            found = there.contact[same.all(axis=0)]
+            here = np.sort([self.replay.i[self.contact], self.replay.j[self.contact]])
+            pairs = np.sort([replay.i, replay.j], axis=0)
+            found = np.flatnonzero((pairs == here[:, None]).all(axis=0))
         else:
             return None
         return int(found[0]) if len(found) else None

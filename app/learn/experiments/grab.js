@@ -45,10 +45,10 @@ export class Grab extends PackingExperiment {
 
   /** At the end of the first rail: contacts that are open or slip, and disks that have lost all their contacts. */
   get atEnd() {
-    const { packing: { contacts, contact, i, j }, first: rail } = this
+    const { packing: { contacts, i, j }, first: rail } = this
     const [normal, tangential] = ["normal", "tangential"].map((name) => rail?.[name].subarray(-contacts) ?? [])
     const marks = this.marks(normal, tangential), held = new Set(), touched = new Set([...i, ...j])
-    contact.forEach((c, k) => { if (marks[c] !== OPENS) for (const disk of [i[k], j[k]]) held.add(disk) })
+    for (let c = 0; c < contacts; c++) if (marks[c] !== OPENS) held.add(i[c]).add(j[c])
     return { opened: marks.filter((mark) => mark === OPENS).length, sliding: marks.filter((mark) => mark === 1).length, bare: rail ? touched.size - held.size : 0 }
   }
 

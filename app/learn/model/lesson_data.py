@@ -113,9 +113,8 @@ class Packings:
         other: the least determined contact near the centre that shares no disk with the marked one.
         """
         replay, exact = self.shown(MU).replay, self.shown(MU).exact
-        bounds, links, marked = exact_intervals(exact, replay), replay.links, self._grabbed(MU)
-        disks = np.zeros((len(replay.backbone), 2), dtype=int)
-        disks[links.contact] = np.column_stack([links.i, links.j])
+        bounds, marked = exact_intervals(exact, replay), self._grabbed(MU)
+        disks = np.column_stack([replay.i, replay.j])
         fits = (_away(replay) < NEAR) & ~np.isin(disks, disks[marked]).any(axis=1)
         other = int(np.argmax(np.where(fits, bounds["high"] - bounds["low"], -1.0)))
         packing = self.library.packing(self.cells[MU].params["packing"])
@@ -216,10 +215,6 @@ class Packings:
 
 def _away(replay: Any) -> Any:
     """Distance of each contact from the centre of the picture, in half view widths (N_c,)."""
-    links, (left, right, bottom, top) = replay.links, replay.window
-    away = np.maximum(
-        np.abs(links.x0 + links.x1 - left - right), np.abs(links.y0 + links.y1 - bottom - top)
-    )
-    nearest = np.full(len(replay.backbone), np.inf)
-    np.minimum.at(nearest, links.contact, away / (right - left))
-    return nearest
+    left, right, bottom, top = replay.window
+    middles = replay.starts + replay.reach / 2
+    return np.abs(2 * middles - [left + right, bottom + top]).max(axis=1) / (right - left)

@@ -1,12 +1,13 @@
 // The look of the forces: width, colour and marks of each contact's chain, as set in the model.
 
 import { plain } from "../../browser/to_object.js"
+import { touching } from "./images.js"
 
 export const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
 const THIN = 0.15 // factor on the width of a chain excluded by a filter
 
 /** A grain by its number; those behind walls stand for them. */
-export const named = (grain, { bodies }) => (grain < bodies ? grain : "wall")
+export const named = (grain, { centres }) => (2 * grain < centres.length ? grain : "wall")
 
 /** A formatted number without the sign of a rounded zero. */
 export const unsigned = (text) => text.replace(/^-(?=[0.]*$)/, "")
@@ -20,11 +21,9 @@ export class Look {
     this.before = null // fₙ before the pull whose changes are coloured
     this.style = { width: new Float32Array(walk.contacts), bin: new Int16Array(walk.contacts) }
     if (walk.outlines?.length) this.style.lean = new Float32Array(walk.contacts) // fₜ/fₙ: the direction of a chain
-    this.widest = new Float32Array(walk.contacts) // half the smaller disk, so that chains hide none
-    for (const [k, c] of [...walk.contact].entries()) {
-      const radii = [walk.i[k], walk.j[k]].filter((grain) => grain < walk.bodies).map((grain) => walk.radius[grain])
-      this.widest[c] = Math.min(...radii)
-    }
+    // Half the smaller disk, so that chains hide none.
+    this.widest = Float32Array.from(walk.i, (i, c) => Math.min(...[i, walk.j[c]].map((grain) => walk.radius[grain] || Infinity)))
+    this.touching = touching(walk)
     this.one = walk.outlines?.length ? "body" : "disk"
     this.measure()
   }
@@ -107,12 +106,12 @@ export class Look {
 
   // Details of the contact under the pointer: rows of name and value
 
-  contact(k, { mixed }) {
-    const { walk, exact } = this, c = walk.contact[k]
+  contact(c, { mixed }) {
+    const { walk, exact } = this
     const n = mixed.normal[c], t = mixed.tangential[c]
     const interval = (from, to) => `${from.toFixed(3)} … ${to.toFixed(3)}`
     const rows = [
-      ["contact", `${walk.backbone[c]} (${this.one === "body" ? "bodies" : "disks"} ${named(walk.i[k], walk)} – ${named(walk.j[k], walk)})`],
+      ["contact", `${walk.backbone[c]} (${this.one === "body" ? "bodies" : "disks"} ${named(walk.i[c], walk)} – ${named(walk.j[c], walk)})`],
       ["normal force fₙ, mean = 1", n.toFixed(3)],
       ["tangential force fₜ", unsigned(t.toFixed(3))],
       ["fₜ/(μ fₙ)", unsigned(this.mobilised(c, n, t)?.toFixed(2) ?? "–")],
@@ -125,11 +124,10 @@ export class Look {
     return rows
   }
 
-  grain(k, { mixed }) {
-    const { walk } = this, grain = walk.grain[k]
-    const rows = [[this.one, `${grain}${walk.kind[k] % 2 ? " (loose)" : ""}`], ["contacts", walk.touching[k]]]
+  grain(grain, { mixed }) {
+    const count = this.touching[grain], rows = [[this.one, `${grain}${count ? "" : " (loose)"}`], ["contacts", count]]
     if (this.one === "body") return rows
-    rows.splice(1, 0, ["radius", walk.r[k].toFixed(3)])
+    rows.splice(1, 0, ["radius", this.walk.radius[grain].toFixed(3)])
     const { pressure, shear, angle } = this.stressOn(grain, mixed)
     if (!(pressure > 0)) return rows
     const degrees = Math.round((angle * 180) / Math.PI)
@@ -141,17 +139,15 @@ export class Look {
 
   /** The forces on a grain: {arm ax, ay from its centre, force fx, fy} of each contact. */
   forcesOn(grain, { normal, tangential }) {
-    const { walk } = this, { i, j, contact, x0, y0, x1, y1 } = walk, forces = [], seen = new Set()
-    const r = walk.radius[grain], index = this.one === "body" ? walk.grain.indexOf(grain) : -1
-    for (let k = 0; k < contact.length; k++) {
-      if ((i[k] !== grain && j[k] !== grain) || seen.has(contact[k])) continue
-      seen.add(contact[k])
-      const c = contact[k], far = Math.hypot(x1[k] - x0[k], y1[k] - y0[k]), out = i[k] === grain ? 1 : -1
-      const nx = (x1[k] - x0[k]) / far, ny = (y1[k] - y0[k]) / far, n = normal[c], t = tangential[c]
+    const { i, j, starts, reach, centres, radius } = this.walk, r = radius[grain], body = this.one === "body", forces = []
+    for (let c = 0; c < i.length; c++) {
+      if (i[c] !== grain && j[c] !== grain) continue
+      const [dx, dy] = [reach[2 * c], reach[2 * c + 1]], far = Math.hypot(dx, dy), out = i[c] === grain ? 1 : -1
+      const nx = dx / far, ny = dy / far, n = normal[c], t = tangential[c]
       // The normal points from i to j, and the force acts on j; t = (−n_y, n_x).
       forces.push({
-        ax: index < 0 ? out * r * nx : (x0[k] + x1[k]) / 2 - walk.x[index],
-        ay: index < 0 ? out * r * ny : (y0[k] + y1[k]) / 2 - walk.y[index],
+        ax: body ? starts[2 * c] + dx / 2 - centres[2 * grain] : out * r * nx,
+        ay: body ? starts[2 * c + 1] + dy / 2 - centres[2 * grain + 1] : out * r * ny,
         fx: -out * (n * nx - t * ny),
         fy: -out * (n * ny + t * nx),
       })
@@ -174,13 +170,8 @@ export class Look {
 
   /** Mean pressure of the grains, weighted by area. */
   meanPressure({ normal }) {
-    const { walk } = this, { i, j, contact, radius } = walk, seen = new Set()
-    let virial = 0
-    for (let k = 0; k < contact.length; k++) {
-      if (seen.has(contact[k])) continue
-      seen.add(contact[k])
-      virial += normal[contact[k]] * (radius[i[k]] + radius[j[k]])
-    }
+    const { i, j, radius } = this.walk
+    const virial = normal.reduce((sum, force, c) => sum + force * (radius[i[c]] + radius[j[c]]), 0)
     return virial / (2 * Math.PI * radius.reduce((sum, r) => sum + r * r, 0))
   }
 }

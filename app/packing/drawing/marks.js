@@ -47,9 +47,9 @@ export function markSelected(marks, scene, selected) {
     marks.lineWidth = 1.2 / scale
     for (const [at, grain] of [[a, geometry.i[k]], [b, geometry.j[k]]]) {
       if (geometry.radius[grain] * scale < SMALL) continue // hidden behind the outline
-      const body = scene.outline(grain) ? geometry.grain.indexOf(grain) : -1
       marks.beginPath()
-      scene.addBody(marks, ...(body < 0 ? at : [geometry.x[body], geometry.y[body]]), grain)
+      const { centres } = geometry, body = scene.outline(grain) && 2 * grain < centres.length
+      scene.addBody(marks, ...(body ? centres.slice(2 * grain, 2 * grain + 2) : at), grain)
       marks.stroke()
     }
     for (const [paint, wide] of [[palette.halo, 6], [palette.selected, 2.5]]) {

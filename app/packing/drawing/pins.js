@@ -47,7 +47,7 @@ export class Pins {
   /** The contact to push: the selected or the highlighted one. */
   pushedContact(scene) {
     const { walk } = this.player.replay
-    return scene.selected ?? walk.contact[walk.inviting] ?? -1
+    return scene.selected ?? walk.inviting ?? -1
   }
 
   /** The two forces that push the disks of a contact apart; faint at its periodic copies. */
@@ -95,13 +95,12 @@ export class Pins {
     context.arc(x, top, r, 0.85 * Math.PI, 0.15 * Math.PI)
     context.lineTo(x, y)
     context.closePath()
-    context.lineWidth = 4
-    context.strokeStyle = halo
-    context.stroke()
-    context.lineWidth = 2
-    context.strokeStyle = context.fillStyle = known
-    context.stroke()
-    if (!exact) context.fillStyle = halo
+    for (const [width, colour] of [[4, halo], [2, known]]) {
+      context.lineWidth = width
+      context.strokeStyle = colour
+      context.stroke()
+    }
+    context.fillStyle = exact ? known : halo
     context.fill()
   }
 

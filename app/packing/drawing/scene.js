@@ -5,6 +5,7 @@ import { addPolygon, inside, line, polygon, unflat } from "../../browser/canvas_
 import { createElement } from "../../browser/dom.js"
 import { LEAST, strokeByClass, strokeEach } from "./chain_strokes.js"
 import { highlight, markForces, markSelected } from "./marks.js"
+import { withImages } from "./images.js"
 import { listen } from "../hand/pointing.js"
 import { PIXELS, Sheet } from "./svg_context.js"
 
@@ -39,12 +40,12 @@ export class Scene {
 
   // Geometry and view
 
-  show(geometry) {
+  show(packing) {
     this.pointed = -1
     this.closeTip()
-    const moved = !this.geometry || `${geometry.window}` !== `${this.geometry.window}`
-    this.geometry = geometry
-    const { x0 } = geometry
+    const moved = `${packing.window}` !== `${this.geometry?.window}`
+    this.geometry = withImages(packing)
+    const { x0 } = this.geometry
     this.width = new Float32Array(x0.length)
     this.bin = new Int16Array(x0.length)
     if (moved) this.reset(false)
@@ -360,7 +361,8 @@ export class Scene {
   /** Describe what is under the pointer, as on screen. */
   fillTip() {
     if (!this.under) return
-    const { link, disk } = this.under, rows = link < 0 ? this.describe.grain(disk) : this.describe.contact(link)
+    const { link, disk } = this.under, { contact, grain } = this.geometry
+    const rows = link < 0 ? this.describe.grain(grain[disk]) : this.describe.contact(contact[link])
     this.tip.innerHTML = rows.map(([name, value]) => `<i>${name}</i><b>${value}</b>`).join("")
   }
 

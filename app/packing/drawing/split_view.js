@@ -16,12 +16,10 @@ export class Split {
     this.twin = twin
     this.other = null // the Replay of another packing
     Object.assign(twin.root, { className: "twin", ariaLabel: "the network beside" })
-    this.through = new Through(scene, twin)
-    Object.defineProperty(twin, "view", {
-      get: () => (this.other ? this.through : scene.view),
-      set: (view) => { scene.view = view },
-    })
-    twin.changed = () => scene.changed()
+    twin.changed = () => {
+      if (!scene.frozen) Object.assign(scene.view, mapped(twin.view, twin.whole, scene.whole))
+      scene.changed()
+    }
     twin.reset = (paint = true) => { if (paint) scene.reset() }
     twin.onRepaint = () => {}
     this.captions = [twin, scene].map(({ root }) => root.appendChild(createElement("div", { className: "caption" })))
@@ -37,7 +35,7 @@ export class Split {
   take() {
     const walk = plain(this.player.model.twin)
     this.other = walk.contacts ? new Replay(walk) : null
-    this.twin.geometry = null
+    this.look = null
     this.show()
   }
 
@@ -83,14 +81,14 @@ export class Split {
   /** Make the twin show a network of a walk, as set in the model. */
   dress(model, walk, shown) {
     const { twin, player } = this
-    if (twin.geometry !== walk) {
+    if (this.look?.walk !== walk) {
       this.look = new Look(model, walk)
       twin.show(walk)
     }
     const { look } = this
     look.measure()
     twin.palette = player.scene.palette
-    twin.describe = { contact: (k) => look.contact(k, shown), grain: (k) => look.grain(k, shown) }
+    twin.describe = { contact: (c) => look.contact(c, shown), grain: (g) => look.grain(g, shown) }
     twin.style = look.of(shown.mixed)
   }
 
@@ -113,10 +111,11 @@ export class Split {
 
   /** After a change of the view or the selection. */
   paint() {
-    const { twin, on, player, other } = this
+    const { twin, on, player: { scene }, other } = this
     if (!on || !twin.style) return
-    twin.selected = other ? null : player.scene.selected
-    twin.pair = other ? [] : player.scene.pair
+    twin.view = mapped(scene.frozen ? scene.whole : scene.view, scene.whole, twin.whole) // a moving packing is shown whole
+    twin.selected = other ? null : scene.selected
+    twin.pair = other ? [] : scene.pair
     twin.resize()
     if (!twin.size) return
     twin.drawDisks()
@@ -125,23 +124,8 @@ export class Split {
   }
 }
 
-/** The view of one scene in another, whose packing has its own box: the whole maps to the whole. */
-class Through {
-  constructor(scene, twin) { Object.assign(this, { scene, twin }) }
-
-  /** A moving packing is shown whole, and so is the comparison. */
-  get from() { return this.scene.frozen ? this.scene.whole : this.scene.view }
-
-  get ratio() { return this.twin.whole.half / this.scene.whole.half }
-
-  of(axis) { return this.twin.whole[axis] + (this.from[axis] - this.scene.whole[axis]) * this.ratio }
-
-  back(axis, value) { this.from[axis] = this.scene.whole[axis] + (value - this.twin.whole[axis]) / this.ratio }
-
-  get x() { return this.of("x") }
-  set x(value) { this.back("x", value) }
-  get y() { return this.of("y") }
-  set y(value) { this.back("y", value) }
-  get half() { return this.from.half * this.ratio }
-  set half(value) { this.from.half = value / this.ratio }
+/** The view of one packing as that of another, which has its own box: the whole maps to the whole. */
+function mapped({ x, y, half }, from, to) {
+  const ratio = to.half / from.half
+  return { x: to.x + (x - from.x) * ratio, y: to.y + (y - from.y) * ratio, half: half * ratio }
 }

@@ -15,8 +15,8 @@ function moving(picture) {
   const { box: [wide, high], tilt, radius, i, centres } = picture
   const unit = radius.reduce((most, r) => Math.max(most, r), 0), half = Math.max(wide + Math.abs(tilt), high) / 2 + unit
   const window = [(wide + tilt) / 2 - half, (wide + tilt) / 2 + half, high / 2 - half, high / 2 + half]
-  const begin = Array.from(i).flatMap((grain) => [centres[2 * grain], centres[2 * grain + 1]])
-  return { ...picture, unit, window, begin }
+  const starts = Array.from(i).flatMap((grain) => [centres[2 * grain], centres[2 * grain + 1]])
+  return { ...picture, unit, window, starts }
 }
 
 /** Chains of a moving packing: width fₙ, colour mobilisation. */

@@ -68,10 +68,9 @@ def test_a_network_is_reached_by_its_number_and_the_stride_is_said(run):
 
 
 def test_bodies_are_found_by_their_outline_and_lines_turn_with_the_force(run):
-    walk = {"x": [0, 5], "y": [0, 0], "r": [2.2, 1], "radius": [2.2, 1], "grain": [0, 1]}
+    walk = {"centres": [0, 0, 5, 0], "radius": [2.2, 1], "unit": 1, "box": [-1, -1], "tilt": 0}
     walk |= {"outlines": [[-2, -1, 2, -1, 2, 1, -2, 1], []], "window": [-10, 10, -10, 10]}
-    walk |= {"x0": [0], "y0": [0], "x1": [2], "y1": [0], "i": [0], "j": [1], "contact": [0]}
-    walk |= {"box": [-1, -1], "walls": [], "unit": 1}
+    walk |= {"starts": [0, 0], "reach": [2, 0], "i": [0], "j": [1], "walls": []}
     found, ends = run(
         "packing/drawing/scene",
         """({ Scene }, { walk }) => {
@@ -207,11 +206,10 @@ def test_to_and_fro_between_two_states_has_a_track_of_two(run):
 
 # A disk of radius 1/2 between two of radius 1, along x: contacts at −1/2 and 1/2.
 PRESSED = {
-    "contacts": 2, "mu": 0.5, "friction": [0.5, 0.5], "contact": [0, 1], "i": [0, 1], "j": [1, 2],
-    "grain": [0, 1, 2],
-    "x0": [-1.5, 0.0], "y0": [0.0, 0.0], "x1": [0.0, 1.5], "y1": [0.0, 0.0],
-    "x": [-1.5, 0.0, 1.5], "y": [0.0, 0.0, 0.0], "r": [1.0, 0.5, 1.0], "radius": [1.0, 0.5, 1.0],
-    "kind": [0, 0, 0], "bodies": 3, "box": [-1, -1], "tilt": 0,
+    "contacts": 2, "mu": 0.5, "friction": [0.5, 0.5], "i": [0, 1], "j": [1, 2],
+    "starts": [-1.5, 0.0, 0.0, 0.0], "reach": [1.5, 0.0, 1.5, 0.0],
+    "centres": [-1.5, 0.0, 0.0, 0.0, 1.5, 0.0], "radius": [1.0, 0.5, 1.0],
+    "box": [-1, -1], "tilt": 0,
     "window": [-3, 3, -3, 3], "unit": 1.0,
     "normal": [2.0, 2.0], "tangential": [0.0, 0.0], "low": [1.0, 2.0], "high": [4.0, 2.5],
 }  # fmt: skip
@@ -251,7 +249,13 @@ def test_no_chain_is_wider_than_half_its_smaller_disk_and_walls_are_named(run):
             return [[...look.of(mixed).width], rows]
         }}""",
         model=MODEL,
-        walk=PRESSED | {"bodies": 2, "radius": [0.75, 0.5, 0.0], "backbone": [7, 8], "number": [0]},
+        walk=PRESSED
+        | {
+            "radius": [0.75, 0.5, 0.0],
+            "centres": [-1.5, 0, 0, 0],
+            "backbone": [7, 8],
+            "number": [0],
+        },
     )
     assert widths == [0.5, 0.5]
     assert [row[0][1] for row in rows] == ["7 (disks 0 – 1)", "8 (disks 1 – wall)"]

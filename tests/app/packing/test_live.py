@@ -8,6 +8,7 @@ import pytest
 from small_store import DISKS
 from visitor import wait_for
 
+from app.background.jobs import Job
 from app.browser.messages import fits
 from app.explore.controls import Controls
 from app.explore.tabs.force_space import force_space
@@ -71,7 +72,7 @@ def test_compaction_and_walk_are_seen_as_they_go(state):
     # that found them all at once would still be sent 21.
     assert len(pictures) > 18 and 0.5 - 1e-6 < fractions[0] < 0.55
     assert fractions[-1] > 0.75 and pictures[0]["box"][0] > 1.15 * pictures[-1]["box"][0]
-    assert len(pictures[0]["x"]) == 2 * DISKS and pictures[-1]["mu"] == 0.23
+    assert len(pictures[0]["centres"]) == 2 * DISKS and pictures[-1]["mu"] == 0.23
     assert state.growing and state.replay is old
     assert "as they are sampled" in state.source
     begun = browser.player.walk
@@ -86,7 +87,7 @@ def test_compaction_and_walk_are_seen_as_they_go(state):
     for name in ("eta1", "eta2", "eta3"):
         sent = np.concatenate([part[name] for part in states])
         np.testing.assert_allclose(sent, state.replay.growth[name][1 : len(sent) + 1], atol=1e-5)
-    np.testing.assert_array_equal(begun["x0"], browser.player.walk["x0"])
+    np.testing.assert_array_equal(begun["starts"], browser.player.walk["starts"])
 
 
 def test_what_is_computed_at_once_is_never_offered_to_be_computed(state):
@@ -267,20 +268,27 @@ def test_a_point_is_seen_to_be_compressed_and_needs_no_walk(state):
 
 
 def test_exact_bounds_are_seen_as_they_are_found(state, monkeypatch):
-    monkeypatch.setattr(progress_feed, "BOUNDS_S", 0)
-    browser = Browser(state)
+    told, seen, tell = threading.Event(), threading.Event(), Job.tell
+
+    def half_way(job, done, total, **options):
+        tell(job, done, total, **options)
+        if total and done >= total / 8 and not told.is_set():
+            told.set()
+            assert seen.wait(240)
+
+    monkeypatch.setattr(Job, "tell", half_way)
     state.compute_exact()
-    assert state.work.arriving is not None and not browser.player.live
-    browser.run()
-    browser.stream.tick()
-    assert state.work.arriving is None and browser.got
-    seen = browser.parts("bounds")
-    known = [np.isfinite(np.stack([part["low"], part["high"]])).sum(axis=1) for part in seen]
-    assert np.all(np.diff(known, axis=0) >= 0) and known[0][1] < len(state.replay.backbone)
+    assert state.work.arriving == {}
+    assert told.wait(240)
+    state.work.poll()
+    found = state.work.arriving
+    seen.set()
+    wait_for(state)
+    assert state.work.arriving is None
+    there = np.isfinite(found["high"])
+    assert there.any() and np.isnan(found["low"]).any()
     exact = state.exact["high"].values[:, 0] / state.replay.force_scale
-    for part in seen:
-        there = np.isfinite(part["high"])
-        np.testing.assert_array_equal(part["high"][there], exact[there].astype(np.float32))
+    np.testing.assert_array_equal(found["high"][there], exact[there])
 
 
 class Glimpse:

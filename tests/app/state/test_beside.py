@@ -23,7 +23,7 @@ def test_with_the_view_split_another_mu_leaves_the_first_beside_it(state):
     wait_for(state)
     assert (state.cell.mu, state.looks.beside, state.comparison.twin.cell.mu) == (0.1, 1, 1)
     assert player.twin["mu"] == 1 and player.walk["mu"] == 0.1
-    assert len(player.twin["x0"]) != len(player.walk["x0"])  # each its own packing
+    assert player.twin["box"] != player.walk["box"]  # each its own packing
     state.choose(mu=0)
     wait_for(state)
     assert (state.cell.mu, state.comparison.twin.cell.mu) == (0, 1)

@@ -44,7 +44,7 @@ class Snapshot:
         )  # fmt: skip
         chosen = state.looks.contact
         self.pushed = state.pushed
-        self.contact = self.replay.invited if chosen is None else chosen
+        self.contact = self.replay.inviting if chosen is None else chosen
         numbers = state.numbers
         self._numbered = self.view if numbers is None else numbers.of(self.view)
         self._shown: dict[str, Any] = {

@@ -42,8 +42,7 @@ def contacts(
     normal, tangential = replay.normal[frame], replay.tangential[frame]
     if held is not None:
         normal, tangential = held.forces.T
-    first = np.unique(replay.links.contact, return_index=True)[1]
-    columns = {"contact": replay.backbone, "i": replay.links.i[first], "j": replay.links.j[first]}
+    columns = {"contact": replay.backbone, "i": replay.i, "j": replay.j}
     columns["x"], columns["y"] = replay.contact_points.T
     columns["n_x"], columns["n_y"] = replay.contact_normals.T
     columns["wall"] = replay.at_walls.astype(int)

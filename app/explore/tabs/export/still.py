@@ -30,7 +30,7 @@ def at_rest(
     state = AppState(library, query=None)
     here = view | {"between": None, "tab": tab}
     with discard_events(state):
-        replay = replay._replace(inviting=-1)  # nothing can be dragged
+        replay = replay._replace(inviting=None)  # nothing can be dragged
         state.param.update(replay=replay, shown=replay, exact=exact, loads=loads)
     with discard_events(state.knowledge):
         state.knowledge.narrowed = narrowed

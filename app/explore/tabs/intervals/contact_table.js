@@ -47,8 +47,7 @@ export function render({ model, view }) {
   /** The data for the columns. */
   function now() {
     const on = player(), { replay, look } = on, { walk, mixed } = replay
-    const pairs = Array(walk.contacts)
-    for (let k = 0; k < walk.contact.length; k++) pairs[walk.contact[k]] ??= [walk.i[k], walk.j[k]].map((grain) => named(grain, walk))
+    const pairs = Array.from(walk.i, (i, c) => [i, walk.j[c]].map((grain) => named(grain, walk)))
     return { walk, mixed, pairs, known: new Set(on.pins.pins.contacts ?? []), exact: look.exact ?? {} }
   }
 

@@ -117,7 +117,7 @@ class View(TabView):
     def contact(self) -> int | None:
         """The contact to push: the selected one, or a strong one near the centre."""
         replay, chosen = self.state.replay, self.looks.contact
-        return replay.invited if chosen is None and replay is not None else chosen
+        return replay.inviting if chosen is None and replay is not None else chosen
 
     def _show(self, shown: Shown) -> None:
         replay = self.state.replay
