@@ -100,7 +100,7 @@ def test_numbers_and_bars_say_that_they_obey_what_is_held(state):
     held(state, 4)
     (h, fewer), shown = state.knowledge.narrowed.dimension, results(state)
     assert f"{h} → {fewer} given the held forces" in shown
-    assert "exact given the held forces" in shown and "seen in all of S" in shown
+    assert "exact given the held forces" in shown and "older than the held forces" in shown
     bars, lead = intervals.drawing.bars.data, intervals.lead
     assert np.all(np.isnan(bars["high"])) and np.all(np.isfinite(bars["exact_high"]))
     assert "given the held forces" in lead.object and "in a network of all of S" in lead.object
