@@ -184,7 +184,8 @@ def test_two_networks_side_by_side_with_one_player(visit):
     page.mouse.move(boxes[0]["x"] + 50, boxes[0]["y"] + 50)
     zoomed(page, -200)
     until(page, "scene.view.half < 0.49 * (scene.geometry.window[1] - scene.geometry.window[0])")
-    assert scene(page, "scene.view === scene.hand.player.split.twin.view")
+    here, beside = scene(page, "[scene.view, scene.hand.player.split.twin.view]")
+    assert beside == pytest.approx(here)
     page.locator("button.step").click()
     until(page, "scene.hand.player.replay.frame === 4")
     assert scene(page, widths) == pinned
