@@ -6,7 +6,6 @@ from serving import (
     MODEL,
     ask,
     at_rest,
-    bars_drawn,
     column,
     expect,
     here,
@@ -270,37 +269,3 @@ def test_a_new_mu_is_seen_to_jam_beside_the_old_one(visit):
     seen = page.evaluate("beside")
     assert seen and all(on and mu == 0.1 and drawn > 20 for on, mu, drawn in seen)
     expect(page.locator(".twin")).to_be_visible()
-
-
-def test_exact_bounds_are_drawn_as_they_come(visit):
-    """Of a bar that has one bound only, the other end is what was seen."""
-    page = visit("?drawn=all")
-    bars_drawn(page)
-    page.locator(".scene").evaluate(
-        """e => {
-            const {player} = e.scene.hand, {walk} = player.replay
-            const low = new Float32Array(walk.contacts).fill(NaN), high = low.slice()
-            high[0] = 7; high[1] = 8; low[1] = 0.25
-            player.arrive({low, high})
-        }"""
-    )
-    at, low, high = (column(page, "bars", name) for name in ("at", "exact_low", "exact_high"))
-    seen = scene(page, "scene.geometry.low[0]")
-    assert high[at.index(0)] == 7 and low[at.index(0)] == pytest.approx(seen)
-    assert (low[at.index(1)], high[at.index(1)]) == (0.25, 8)
-    there = f"() => {MODEL}('bars').get_column('exact_high').filter(Number.isFinite).length"
-    assert page.evaluate(there) == 2
-    # bars in another order get them, too
-    page.evaluate(
-        f"""() => {{
-            const bars = {MODEL}("bars"), turned = {{}}
-            for (const [name, values] of Object.entries(bars.data)) {{
-                const copy = values.slice().reverse()
-                turned[name] = name.startsWith("exact") ? copy.fill(NaN) : copy
-            }}
-            bars.data = turned
-        }}"""
-    )
-    page.wait_for_function(f"() => ({there})() === 2")
-    turned, high = (column(page, "bars", name) for name in ("at", "exact_high"))
-    assert turned == at[::-1] and high[turned.index(0)] == 7

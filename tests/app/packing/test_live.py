@@ -291,6 +291,19 @@ def test_exact_bounds_are_seen_as_they_are_found(state, monkeypatch):
     np.testing.assert_array_equal(found["high"][there], exact[there])
 
 
+def test_exact_bounds_are_drawn_as_they_come(state):
+    """Of a bar that has one bound only, the other end is what was seen."""
+    tab, low = View(state), np.full(len(state.replay.backbone), np.nan)
+    high = low.copy()
+    high[0], high[1], low[1] = 7, 8, 0.25
+    state.work.arriving = {"low": low, "high": high}
+    bars = tab.drawing.bars.data
+    first, second = (int(np.flatnonzero(bars["at"] == contact)[0]) for contact in (0, 1))
+    assert bars["exact_high"][first] == 7 and bars["exact_low"][first] == state.replay.low[0, 0]
+    assert (bars["exact_low"][second], bars["exact_high"][second]) == (0.25, 8)
+    assert np.isfinite(bars["exact_high"]).sum() == 2
+
+
 class Glimpse:
     """A packing as `gf.pack` shows it, of so many grains in a box of this side."""
 
