@@ -7,6 +7,7 @@ import threading
 import weakref
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +28,7 @@ from granforce.numerics import (
 )
 from granforce.numerics.contact_matrix import Network
 from granforce.numerics.contact_program import Problem
+from granforce.numerics.lanes import MANY, ONE
 from granforce.numerics.linear_programs import Centre
 from granforce.records import UnboundedError, UndecidedError, brief_list
 from granforce.system import cancelling
@@ -158,8 +160,8 @@ def problem_of(ensemble: Ensemble) -> Problem:
     return _shared_of(ensemble).problem
 
 
-def independent_problem_of(ensemble: Ensemble) -> Problem:
-    """The Problem for linear programs: independent rows, exactly."""
+def independent_problem_of(ensemble: Ensemble, lanes: Any = ONE) -> Problem:
+    """The Problem for linear programs: independent rows, exactly; lanes as for `centre_of`."""
     shared = _shared_of(ensemble)
     if shared.independent is None:
         problem, idle = shared.problem, shared.idle
@@ -167,7 +169,7 @@ def independent_problem_of(ensemble: Ensemble) -> Problem:
             out = np.zeros(len(idle), bool)
             out[problem.place] = _dependent_rows(ensemble)
         else:
-            out = interior_point.dependent_rows(problem, idle)
+            out = interior_point.dependent_rows(problem, idle, lanes)
         shared.independent = contact_program.without_rows(problem, idle, out)
     return shared.independent
 
@@ -187,11 +189,14 @@ def _dependent_rows(ensemble: Ensemble) -> Mask:
     return out
 
 
-def centre_of(ensemble: Ensemble) -> Centre:
-    """The analytic centre of an ensemble's independent Problem, found on first use."""
+def centre_of(ensemble: Ensemble, lanes: Any = ONE) -> Centre:
+    """The analytic centre of an ensemble's independent Problem, found on first use.
+
+    lanes: those of the computations that follow, so that kernels compile for one width.
+    """
     shared = _shared_of(ensemble)
     if shared.centre is None:
-        shared.centre = linear_programs.centre(independent_problem_of(ensemble))
+        shared.centre = linear_programs.centre(independent_problem_of(ensemble, lanes), lanes)
     return shared.centre
 
 
@@ -249,8 +254,8 @@ def _new_system(ensemble: Ensemble) -> certified_values.System:
         )
         loads = sparse.vstack([loads, sparse.csc_matrix((len(b) - loads.shape[0], count))])
         bounding = None
-    problem = independent_problem_of(ensemble)
-    middle = centre_of(ensemble)
+    problem = independent_problem_of(ensemble, MANY)
+    middle = centre_of(ensemble, MANY)
     states = [middle.y] if middle.converged else []
     if ensemble.reference is not None:
         states.append(_coordinates(ensemble, ensemble.reference))

@@ -19,6 +19,8 @@ to stop. Other kinds of step use the same matrix: towards the centre, towards th
 Newton's step on v alone after `cone_projection.project`.
 """
 
+from typing import Any
+
 from granforce.numerics import cholesky, contact_matrix
 from granforce.numerics.contact_matrix import clear, copy, pull, push
 from granforce.numerics.contact_program import (
@@ -64,14 +66,17 @@ _LIGHT = 1e-10
 OPTIMUM, CENTRE, BALANCE, PROJECTED, REFINED = range(5)
 
 
-def dependent_rows(problem: Problem, idle: Floats) -> Mask:
-    """Mask (rows,) of rows of the balance that follow from others: those without a pivot."""
+def dependent_rows(problem: Problem, idle: Floats, lanes: Any = ONE) -> Mask:
+    """Mask (rows,) of rows of the balance that follow from others: those without a pivot.
+
+    lanes: ONE, or MANY with the same bits where only kernels for these are needed otherwise.
+    """
     network, problem = problem.network, linear(problem, idle)
     # With y = 1 the matrix is A Aᵀ/2.
-    at, work = make_iterate(problem, 1), make_workspace(problem, 1)
+    at, work = make_iterate(problem, len(lanes)), make_workspace(problem, len(lanes))
     work.least[:] = 0.5 * _DEPENDENT * diagonal_of(network)
-    look(problem, True, at, work, ONE)
-    advance(problem, True, BALANCE, at, work, ONE)
+    look(problem, True, at, work, lanes)
+    advance(problem, True, BALANCE, at, work, lanes)
     cancelling.check()
     return cholesky.left_out(network, work.factors) & (idle == 0)
 

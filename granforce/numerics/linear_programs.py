@@ -14,7 +14,7 @@ from scipy import sparse
 from granforce.numerics import contact_program, interior_point
 from granforce.numerics.contact_program import Iterate, Problem, Workspace
 from granforce.numerics.interior_point import BALANCE, CENTRE, OPTIMUM, REFINED
-from granforce.numerics.lanes import ONE, lanes_for
+from granforce.numerics.lanes import LANES, MANY, ONE
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 from granforce.types import Floats
@@ -66,20 +66,24 @@ class Centre(NamedTuple):
     converged: bool
 
 
-def centre(problem: Problem) -> Centre:
-    """The analytic centre of a problem, by Newton's method on y z = 1."""
-    at, work = contact_program.make_iterate(problem, 1), contact_program.make_workspace(problem, 1)
+def centre(problem: Problem, lanes: Any = ONE) -> Centre:
+    """The analytic centre of a problem, by Newton's method on y z = 1.
+
+    lanes: as in `interior_point.dependent_rows`.
+    """
+    at = contact_program.make_iterate(problem, len(lanes))
+    work = contact_program.make_workspace(problem, len(lanes))
     at.c[-1] = 1.0
     converged = False
     for _ in range(_MOST_STEPS):
-        interior_point.look(problem, True, at, work, ONE)
+        interior_point.look(problem, True, at, work, lanes)
         off = np.abs(at.y * at.z - 1).max()
         unbalance = max(work.unbalance[0, 0], work.slackness[0, 0])
         converged = bool(off < 0.3 and unbalance < BALANCED)
         if converged or not np.isfinite(off):
             break
         cancelling.check()
-        interior_point.advance(problem, True, CENTRE, at, work, ONE)
+        interior_point.advance(problem, True, CENTRE, at, work, lanes)
     return Centre(at.y[:-1, 0], at.z[:-1, 0], at.v[:, 0], at.v_border[:, 0], converged)
 
 
@@ -119,16 +123,14 @@ def _work(
     """One thread: fill lanes from the queue, step, and pass finished outcomes on."""
     if not waiting:
         return
-    lanes = lanes_for(len(waiting))
-    width = len(lanes)
-    at = contact_program.make_iterate(problem, width)
-    work = contact_program.make_workspace(problem, width)
-    steps = np.zeros(width, dtype=np.int64)
-    number = np.array([fill(middle, at, lane, programs, waiting) for lane in range(width)])
+    at = contact_program.make_iterate(problem, LANES)
+    work = contact_program.make_workspace(problem, LANES)
+    steps = np.zeros(LANES, dtype=np.int64)
+    number = np.array([fill(middle, at, lane, programs, waiting) for lane in range(LANES)])
     arrived = []
     while True:
         cancelling.check()
-        interior_point.look(problem, True, at, work, lanes)
+        interior_point.look(problem, True, at, work, MANY)
         gap, unbalance = work.product[0], work.unbalance[0]
         done = (gap <= _LEAVE_GAP) & (unbalance <= _LEAVE_UNBALANCE)
         done |= (gap <= _HOPELESS * _LEAVE_GAP) | ~np.isfinite(gap) | (steps >= _MOST_STEPS)
@@ -138,14 +140,14 @@ def _work(
             arrived.append(_outcome(problem, at, lane, number[lane], loaded, steps[lane]))
             number[lane] = fill(middle, at, lane, programs, waiting)
             steps[lane] = 0
-        while len(arrived) >= width or (arrived and not np.any(number >= 0)):
-            finished(balanced(problem, middle, arrived[:width], work, lanes))
-            arrived = arrived[width:]
+        while len(arrived) >= LANES or (arrived and not np.any(number >= 0)):
+            finished(balanced(problem, middle, arrived[:LANES], work))
+            arrived = arrived[LANES:]
         if not np.any(number >= 0):
             return
         if len(left):
-            interior_point.look(problem, True, at, work, lanes)
-        interior_point.advance(problem, True, mode, at, work, lanes)
+            interior_point.look(problem, True, at, work, MANY)
+        interior_point.advance(problem, True, mode, at, work, MANY)
         steps += 1
 
 
@@ -215,15 +217,14 @@ def balanced(
     middle: Centre,
     outcomes: Sequence[ProgramOutcome],
     work: Workspace | None = None,
-    lanes: Any = ONE,
 ) -> list[ProgramOutcome]:
     """Move at most as many outcomes as lanes into S, if they are close to it.
 
     First A y + a F = b is restored; components that became negative are then corrected by mixing in
     as little as possible of the centre, which is balanced and positive.
     """
-    work = work or contact_program.make_workspace(problem, len(lanes))
-    at = contact_program.make_iterate(problem, len(lanes))
+    work = work or contact_program.make_workspace(problem, LANES)
+    at = contact_program.make_iterate(problem, LANES)
     for lane, outcome in enumerate(outcomes):
         at.y[:-1, lane] = outcome.y
         at.loaded[lane] = outcome.loaded
@@ -231,13 +232,13 @@ def balanced(
             at.y[-1, lane] = outcome.load
     restored = BALANCED * (_RESTORED_LOADED if problem.b.any() else _RESTORED)
     for _ in range(_MOST_BALANCING):
-        interior_point.look(problem, True, at, work, lanes)
+        interior_point.look(problem, True, at, work, MANY)
         done = work.unbalance[0] <= restored
         if done[: len(outcomes)].all():
             break
         # Those are restored, so that no outcome depends on the others in its batch.
         kept = at.y[:, done].copy()
-        interior_point.advance(problem, True, BALANCE, at, work, lanes)
+        interior_point.advance(problem, True, BALANCE, at, work, MANY)
         at.y[:, done] = kept
     y, load = at.y[:-1], at.y[-1]
     if middle.converged:
