@@ -14,6 +14,7 @@ from scipy.sparse.linalg import splu
 
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
+from granforce.records import NotJammedError, UndecidedError
 from granforce.system import cancelling
 from granforce.tolerances import FLAT
 from granforce.types import Floats, Mask
@@ -44,14 +45,29 @@ def inner_point(A: sparse.csr_matrix, b: Floats) -> InnerPoint:
 
     Raises NotJammedError if the polytope is empty, UndecidedError if no solver succeeds.
     """
-    A = sparse.csc_matrix(A)
-    y, held, resolution = np.zeros(A.shape[1]), np.ones(A.shape[1], dtype=bool), FLAT
+    A, point = sparse.csc_matrix(A), _nowhere(A)
     for unit in _UNITS:
-        y, held, resolution = _searched(A, b, unit, InnerPoint(y, held, resolution))
+        point = _searched(A, b, unit, point)
+    y, held, resolution = point
     y = np.maximum(y, 0.0)
     free, rest = A[:, ~held], b - A[:, held] @ y[held]
     y[~held], _ = cancelling.apart(balanced, free, rest, y[~held])
     return InnerPoint(y, held | (y <= 0), resolution)
+
+
+def away_from_walls(A: sparse.csr_matrix, b: Floats) -> Floats | None:
+    """A balanced y (n,) found by the first program alone; None, or some y ≤ 0, if it finds none."""
+    A, start = sparse.csc_matrix(A), _nowhere(A)
+    try:
+        y = _raised(A, b, _UNITS[0], start, start.held)
+    except (NotJammedError, UndecidedError):
+        return None
+    return None if y is None else cancelling.apart(balanced, A, b, y)[0]
+
+
+def _nowhere(A: sparse.csc_matrix) -> InnerPoint:
+    """Where the search begins: every coordinate is at 0."""
+    return InnerPoint(np.zeros(A.shape[1]), np.ones(A.shape[1], dtype=bool), FLAT)
 
 
 def _searched(A: sparse.csc_matrix, b: Floats, unit: float, start: InnerPoint) -> InnerPoint:

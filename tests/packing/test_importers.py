@@ -14,6 +14,7 @@ from packings import skewed
 import granforce as gf
 from granforce.forces.balance import stress_of
 from granforce.forces.build import ensemble
+from granforce.numerics import interior_point
 from granforce.packing.closing import margin
 from granforce.packing.compaction import pack
 from granforce.packing.exporters import save_lammps
@@ -96,9 +97,11 @@ def cluster(packing, reach):
 
 
 @pytest.mark.parametrize("path", REFERENCES, ids=lambda path: path.stem)
-def test_reference_packings_are_balanced_inside_their_cones(path):
+def test_reference_packings_are_balanced_inside_their_cones(path, monkeypatch):
     packing = load_packing(path)
-    known = report(packing)
+    with monkeypatch.context() as patch:
+        patch.setattr(interior_point, "look", None)  # a report compiles nothing
+        known = report(packing)
     assert known["grains"] == len(np.load(path)["r"])
     assert known["contacts"] == len(np.load(path)["fn"])
     assert known["residual"] < 2e-12

@@ -9,6 +9,7 @@ import numpy as np
 from granforce.forces.balance import left_open_in, mean_load
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
+from granforce.forces.hull import dimension_of
 from granforce.forces.nearest import nearest
 from granforce.numerics.highs import least_unbalanced
 from granforce.packing.assemblies import larger_tolerance
@@ -199,7 +200,7 @@ def report(packing: Packing) -> dict[str, Any]:
         "pressure": None if np.isnan(packing.pressure) else packing.pressure,
         "packing_fraction": packing.packing_fraction if closed else None,
         "coordination": float(ens.coordination),
-        "dimension": int(ens.dimension),
+        "dimension": dimension_of(ens),
         "mean_normal_force": float(ens.force_scale) if loaded else None,
         "residual": verdict["residual"],
         "violation": verdict["violation"],
