@@ -2,47 +2,35 @@
 
 import numpy as np
 
+from granforce.cell import Cell
 from granforce.numerics.lanes import allocating, allocating_part, within
+from granforce.types import Floats, Integers
 
 
-@allocating
-def find_pairs(x, r, cell, cutoff):
+def find_pairs(
+    x: Floats, r: Floats, cell: Cell, cutoff: float
+) -> tuple[Integers, Integers, Integers]:
     """All pairs with gap < cutoff, each periodic image separately.
 
-    x (N, 2), r (N,), cell: a Cell. Returns i, j (P,) with i < j and shift (P, 2): the image of j at
-    x_j + shift · cell.vectors is the neighbour of i.
+    x (N, 2), r (N,). Returns i, j (P,) with i < j and shift (P, 2): the image of j at x_j + shift ·
+    cell.vectors is the neighbour of i.
     """
-    n = x.shape[0]
-    box = cell.box
-    reach = 2.0 * r.max() + cutoff
-    cells = np.ones(2, np.int64)
-    low = np.zeros(2)
-    size = np.ones(2)
-    high = _heights(cell)
-    for k in range(2):
-        if np.isfinite(box[k]):
-            size[k] = box[k]
-        else:
-            low[k] = x[:, k].min()
-            size[k] = x[:, k].max() - low[k] + 1e-12
-            high[k] = size[k]
-        cells[k] = max(1, min(int(high[k] / reach), int(2 * np.sqrt(n)) + 1))
-    periodic = np.isfinite(box)
+    box, periodic = cell.box, np.isfinite(cell.box)
+    reach, most = 2.0 * r.max() + cutoff, int(2 * np.sqrt(len(r))) + 1
+    low = np.where(periodic, 0.0, x.min(axis=0))
+    size = np.where(periodic, box, x.max(axis=0) - low + 1e-12)
+    high = np.where(periodic, cell.heights, size)
+    cells = np.maximum(1, np.minimum(high / reach, most).astype(np.int64))
     # With fewer than three cells along a periodic side, one pair may touch through several images,
     # or the stencil would visit a cell twice; then every image is tried in turn.
-    for k in range(2):
-        if periodic[k] and cells[k] < 3:
-            return _every_image(x, r, cell, cutoff, reach)
-    return _by_cells(x, r, cell, cutoff, low, size, cells)
-
-
-@allocating_part
-def _heights(cell):
-    """Distances between opposite sides of the cell, along a and b."""
-    high = cell.box.copy()
-    if cell.tilt != 0.0:
-        high[0] *= cell.box[1] / np.hypot(cell.tilt, cell.box[1])
-    return high
+    if np.any(periodic & (cells < 3)):
+        images = np.where(periodic, np.ceil(reach / high), 0.0).astype(np.int64)
+        return _every_image(x, r, cell, cutoff, images)
+    along = np.stack([x[:, 0] - cell.tilt * (x[:, 1] / box[1]), x[:, 1]], axis=1)
+    u = (along - low) / size
+    u -= np.where(periodic, np.floor(u), 0.0)
+    place = np.minimum((u * cells).astype(np.int64), cells - 1)
+    return _by_cells(x, r, cell, cutoff, place, np.full(cells, -1))
 
 
 @within
@@ -62,20 +50,16 @@ def _nearest_shift(cell, d_x, d_y):
     return s_x, s_y
 
 
-@allocating_part
-def _every_image(x, r, cell, cutoff, reach):
+@allocating
+def _every_image(x, r, cell, cutoff, images):
+    """Pairs from all images up to `images` (2,) beyond the nearest along each side."""
     n = x.shape[0]
-    reach_shift = np.zeros(2, np.int64)
-    high = _heights(cell)
-    for k in range(2):
-        if np.isfinite(cell.box[k]):
-            reach_shift[k] = int(np.ceil(reach / high[k]))
     rows = [(0, 0, 0, 0)]
     for i in range(n):
         for j in range(i + 1, n):
             base_x, base_y = _nearest_shift(cell, x[j, 0] - x[i, 0], x[j, 1] - x[i, 1])
-            for s_x in range(base_x - reach_shift[0], base_x + reach_shift[0] + 1):
-                for s_y in range(base_y - reach_shift[1], base_y + reach_shift[1] + 1):
+            for s_x in range(base_x - images[0], base_x + images[0] + 1):
+                for s_y in range(base_y - images[1], base_y + images[1] + 1):
                     _append(rows, x, r, cell, cutoff, i, j, s_x, s_y)
     return _columns(rows)
 
@@ -96,20 +80,13 @@ def _step(x, cell, i, j, s_x, s_y):
     return d_x + s_y * cell.tilt, d_y
 
 
-@allocating_part
-def _by_cells(x, r, cell, cutoff, low, size, cells):
+@allocating
+def _by_cells(x, r, cell, cutoff, place, first):
+    """Pairs in neighbouring cells; place (N, 2): the cell of each disk, first: −1 per cell."""
     n = x.shape[0]
-    box = cell.box
-    place = np.empty((n, 2), np.int64)
-    first = np.full((cells[0], cells[1]), -1, np.int64)
+    box, cells = cell.box, first.shape
     after = np.empty(n, np.int64)
     for i in range(n):
-        along = _across(cell, x[i, 0], x[i, 1]), x[i, 1]
-        for k in range(2):
-            u = (along[k] - low[k]) / size[k]
-            if np.isfinite(box[k]):
-                u -= np.floor(u)
-            place[i, k] = min(int(u * cells[k]), cells[k] - 1)
         a, b = place[i, 0], place[i, 1]
         after[i] = first[a, b]
         first[a, b] = i
