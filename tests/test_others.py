@@ -24,6 +24,8 @@ KERNELS = {
     ("system/compiled.py", "_load_index"),
     ("system/part_compiler.py", "numba.core.codegen"),
     ("system/part_compiler.py", "numba.core.compiler"),
+    ("system/part_compiler.py", "numba.core.dispatcher"),
+    ("system/part_compiler.py", "numba.core.types.misc"),
     ("system/part_compiler.py", "_engine"),
     ("system/part_compiler.py", "_add_module"),
     ("system/part_compiler.py", "_final_module"),

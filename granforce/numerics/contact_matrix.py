@@ -95,7 +95,7 @@ def pull(network, c, x, y, lanes):
     """(Aᵀ x)_n and (Aᵀ x)_t of contact c; x (rows, W), y (m, W) for the global rows."""
     normal = tangential = same(lanes, 0.0)
     for first, grain in ((0, network.high[c]), (3, network.low[c])):
-        e = _columns_of(network, c, first)
+        e = _columns_of(network.columns[c], first)
         x0, x1 = load(x, 3 * grain, lanes), load(x, 3 * grain + 1, lanes)
         x2 = load(x, 3 * grain + 2, lanes)
         normal = fma(e[0], x0, fma(e[1], x1, fma(e[2], x2, normal)))
@@ -113,7 +113,7 @@ def pull(network, c, x, y, lanes):
 def push(network, c, normal, tangential, x, y, lanes):
     """x, y ← x, y + A f for the forces f of contact c; shapes as in `pull`."""
     for first, grain in ((0, network.high[c]), (3, network.low[c])):
-        e = _columns_of(network, c, first)
+        e = _columns_of(network.columns[c], first)
         x0 = fma(e[0], normal, fma(e[3], tangential, load(x, 3 * grain, lanes)))
         x1 = fma(e[1], normal, fma(e[4], tangential, load(x, 3 * grain + 1, lanes)))
         x2 = fma(e[2], normal, fma(e[5], tangential, load(x, 3 * grain + 2, lanes)))
@@ -175,7 +175,7 @@ def _add_diagonal(network, c, nn, nt, tn, tt, factors, lanes):
     """Add E K Eᵀ to the blocks of both grains and to the corner."""
     start = network.layout.start
     for first, grain in ((0, network.high[c]), (3, network.low[c])):
-        e = _columns_of(network, c, first)
+        e = _columns_of(network.columns[c], first)
         _add_block(factors.lower, 9 * start[grain], e, _times(nn, nt, tn, tt, e), lanes)
     g = network.border[c]
     m = len(g) // 2
@@ -188,7 +188,7 @@ def _add_diagonal(network, c, nn, nt, tn, tt, factors, lanes):
 @inline
 def _add_between(network, c, nn, nt, tn, tt, blocks, sides, lanes):
     """Add E K E′ᵀ to the block between the grains, and the products with global rows."""
-    high, low = _columns_of(network, c, 0), _columns_of(network, c, 3)
+    high, low = _columns_of(network.columns[c], 0), _columns_of(network.columns[c], 3)
     by_low = _times(nn, nt, tn, tt, low)
     _add_block(blocks, 9 * network.block[c], high, by_low, lanes)
     g, grains = network.border[c], len(network.layout.start) - 1
@@ -202,9 +202,8 @@ def _add_between(network, c, nn, nt, tn, tt, blocks, sides, lanes):
 
 
 @within
-def _columns_of(network, c, first):
+def _columns_of(e, first):
     """Action of unit f_n and unit f_t on the three rows of a contact's later or earlier grain."""
-    e = network.columns[c]
     return e[first], e[first + 1], e[first + 2], e[first + 6], e[first + 7], e[first + 8]
 
 

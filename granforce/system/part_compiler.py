@@ -11,6 +11,8 @@ from typing import Any
 from llvmlite import binding
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.dispatcher import Dispatcher
+from numba.core.types.misc import unliteral
 
 # What kept parts are marked with, besides numba's "bitcode" and "object".
 _PART = "part"
@@ -67,4 +69,17 @@ def _keep_parts() -> None:
     JITCodeLibrary._unserialize = classmethod(unserialize)
 
 
+def _compile_once_for_all_constants() -> None:
+    """Make numba compile a part for the type of an integer, and not again for each constant."""
+    typed = Dispatcher.get_call_template
+
+    def typed_by_kind(self: Any, args: Any, kws: Any) -> Any:
+        if self._compiler.pipeline_class is PartCompiler:
+            args = tuple(map(unliteral, args))
+        return typed(self, args, kws)
+
+    Dispatcher.get_call_template = typed_by_kind  # type: ignore[method-assign]
+
+
 _keep_parts()
+_compile_once_for_all_constants()
