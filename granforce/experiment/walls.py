@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy import optimize
+import scipy  # which imports its parts on first use
 
 from granforce.experiment.boundary import boundary
 from granforce.experiment.listings.listing import Listing
@@ -299,7 +299,7 @@ def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Wal
     centre = x[~inner].mean(axis=0)
     away = np.hypot(*(x - centre).T)
     start = [*centre, away[inner].mean() if inner.any() else 0.0, away[~inner].mean()]
-    best = optimize.least_squares(misses, start, loss="soft_l1", f_scale=0.1 * r.mean()).x
+    best = scipy.optimize.least_squares(misses, start, loss="soft_l1", f_scale=0.1 * r.mean()).x
     cut = best if shape == "annulus" else best[[0, 1, 3]]
     return _outline(shape, ",".join(repr(float(unit * value)) for value in cut))
 

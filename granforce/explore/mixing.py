@@ -10,7 +10,8 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from scipy import fft, stats
+import scipy  # which imports its parts on first use
+from scipy import fft
 from scipy.special import ndtri
 
 from granforce.fields import derived, record
@@ -94,7 +95,9 @@ def _halves(x: Floats) -> Floats:
 def _scores(x: Floats) -> Floats:
     """Normal scores of the ranks of each component's draws, by Blom."""
     flat = x.reshape(len(x), -1)
-    return ndtri((stats.rankdata(flat, axis=1) - 0.375) / (flat.shape[1] + 0.25)).reshape(x.shape)
+    return ndtri((scipy.stats.rankdata(flat, axis=1) - 0.375) / (flat.shape[1] + 0.25)).reshape(
+        x.shape
+    )
 
 
 def _spread_ratio(x: Floats) -> Floats:

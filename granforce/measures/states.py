@@ -8,7 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy import sparse, stats
+import scipy  # which imports its parts on first use
+from scipy import sparse
 from scipy.sparse import csgraph
 
 from granforce.records import InputError, float_array, moderate, real_array, refuse_hidden, whole
@@ -215,7 +216,7 @@ def correlation(normal_forces: Floats, extent: Floats) -> float:
     _alike(normal_forces, extent)
     if np.ptp(extent) <= 1e-12 * np.abs(normal_forces).max(initial=0) or np.ptp(normal_forces) == 0:
         return float("nan")
-    return float(stats.pearsonr(normal_forces, extent).statistic)
+    return float(scipy.stats.pearsonr(normal_forces, extent).statistic)
 
 
 def correlation_range(states: Floats, extent: Floats) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
-from scipy import optimize, stats
+import scipy  # which imports its parts on first use
 
 from granforce.types import Floats
 
@@ -29,7 +29,7 @@ def mean_interval(values: Iterable[float], level: float = LEVEL) -> tuple[float,
     mean = float(values.mean())
     if len(values) < 2:
         return mean, float("nan"), float("nan")
-    reach = stats.t.ppf((1 + level) / 2, len(values) - 1) * stats.sem(values)
+    reach = scipy.stats.t.ppf((1 + level) / 2, len(values) - 1) * scipy.stats.sem(values)
     return mean, float(mean - reach), float(mean + reach)
 
 
@@ -46,7 +46,7 @@ def difference_interval(
     if not squares.any():
         return difference, difference, difference
     freedom = squares.sum() ** 2 / (squares**2 / (counts - 1)).sum()
-    reach = float(stats.t.ppf((1 + level) / 2, freedom) * np.sqrt(squares.sum()))
+    reach = float(scipy.stats.t.ppf((1 + level) / 2, freedom) * np.sqrt(squares.sum()))
     return difference, difference - reach, difference + reach
 
 
@@ -60,7 +60,9 @@ def jackknife(
     """
     items = list(items)
     value = float(statistic(items))
-    reach = stats.t.ppf((1 + level) / 2, max(1, len(items) - 1)) * jackknife_error(statistic, items)
+    reach = scipy.stats.t.ppf((1 + level) / 2, max(1, len(items) - 1)) * jackknife_error(
+        statistic, items
+    )
     return value, float(value - reach), float(value + reach)
 
 
@@ -90,7 +92,7 @@ def stratified_interval(groups: Iterable[Iterable[float]]) -> tuple[float, float
     if not squares.any():
         return mean, mean, mean
     freedom = squares.sum() ** 2 / np.sum(squares**2 / [len(values) - 1 for values in arrays])
-    reach = float(stats.t.ppf((1 + LEVEL) / 2, freedom) * np.sqrt(squares.sum()))
+    reach = float(scipy.stats.t.ppf((1 + LEVEL) / 2, freedom) * np.sqrt(squares.sum()))
     return mean, mean - reach, mean + reach
 
 
@@ -179,7 +181,7 @@ def percentile_interval(drawn: Floats, level: float = LEVEL) -> tuple[float, flo
 
 def rank_correlation(x: npt.ArrayLike, y: npt.ArrayLike) -> float:
     """Spearman's rank correlation; ties share their rank. NaN if one of them does not vary."""
-    ranks = stats.rankdata(x), stats.rankdata(y)
+    ranks = scipy.stats.rankdata(x), scipy.stats.rankdata(y)
     if min(map(np.ptp, ranks)) == 0:
         return float("nan")
     return float(np.corrcoef(*ranks)[0, 1])
@@ -206,7 +208,9 @@ def departure(values: npt.ArrayLike) -> float:
         at, count = np.r_[0.0, at], np.r_[0, count]
     below = np.cumsum(count) / count.sum()
     gap = np.diff(at)
-    slope = optimize.isotonic_regression(np.diff(below) / gap, weights=gap, increasing=False).x
+    slope = scipy.optimize.isotonic_regression(
+        np.diff(below) / gap, weights=gap, increasing=False
+    ).x
     majorant = below[0] + np.r_[0.0, np.cumsum(slope * gap)]
     # F is lowest just before it rises.
     return float((majorant[1:] - below[:-1]).max(initial=0.0))
@@ -275,7 +279,7 @@ def tail_exponent(values: npt.ArrayLike, quantile: float = 0.5) -> float:
         excess = np.expm1(b * logs).sum()
         return np.log(excess) - log_b - b * logs.mean()
 
-    optimum = optimize.minimize_scalar(
+    optimum = scipy.optimize.minimize_scalar(
         minus_likelihood, bounds=np.log([0.02, 50]), method="bounded"
     )
     return float(np.exp(optimum.x))
