@@ -99,3 +99,7 @@ JOINT_GAP, LOADED_JOINT = 1e-6, 0.01
 
 # Part of the largest coordinate of an unbounded direction from which a contact takes part in it.
 LOCKED = 1e-6
+
+# Packings of more disks are large: sweeps update contacts in groups, the test of rest has fewer
+# draws, and the last phase of a compaction begins later and gives up earlier.
+LARGE = 1000

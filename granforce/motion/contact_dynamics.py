@@ -10,8 +10,10 @@ initially at rest. A sweep updates one set of forces, or eight in parallel.
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
 
 from granforce.motion.box_motion import (
+    by_type,
     carried,
     driven,
     fastest,
@@ -21,6 +23,13 @@ from granforce.motion.box_motion import (
     sheared,
     soften,
     stretched,
+)
+from granforce.motion.contact_groups import (
+    breach_of_groups,
+    grouped,
+    stiffen,
+    sweep_groups,
+    ungroup,
 )
 from granforce.numerics.lanes import (
     ONE,
@@ -204,10 +213,11 @@ ROUNDING = 1e-14
 
 
 @allocating
-def advance(motion, mu, pressure, pace, moved, steps, counters, stop):
+def advance(motion, mu, pressure, pace, moved, steps, counters, stop, lanes):
     """Do up to `steps` time steps, ending early when the neighbour list has to be rebuilt.
 
     That is when two grains may have approached by `moved`. Also returns once stop[0] is set.
+    Contacts are updated one by one, or in groups if `lanes` are MANY.
 
     Returns the last step's mean overlap of carrying contacts (in largest radii) and unbalance: the
     largest change of momentum of a grain per step, in units of the mean contact force.
@@ -216,13 +226,13 @@ def advance(motion, mu, pressure, pace, moved, steps, counters, stop):
     for _ in range(steps):
         if motion.drift[0] > moved or stop[0]:
             break
-        overlap, unbalance = _step(motion, mu, pressure, pace, counters, stop)
+        overlap, unbalance = _step(motion, mu, pressure, pace, counters, stop, lanes)
         counters[STEPS] += 1
     return overlap, unbalance
 
 
 @allocating_part
-def _step(motion, mu, pressure, pace, counters, stop):
+def _step(motion, mu, pressure, pace, counters, stop, lanes):
     velocity, box = motion.velocity, motion.box
     volume, dt = box[0] * box[1], motion.pace[0]
     active, problem, overlap = _near_contacts(motion, dt, pace.box_mass * 2.0 * volume)
@@ -237,7 +247,7 @@ def _step(motion, mu, pressure, pace, counters, stop):
     set_stiffness(problem)
     soften(free, problem)
     free = add_forces(problem, force, velocity, free)
-    dilation = _swept(motion, problem, mu, pace, force, velocity, free, dt, counters, stop)
+    dilation = _swept(motion, problem, mu, pace, force, velocity, free, dt, counters, stop, lanes)
     for p in range(motion.force.shape[0]):
         motion.force[p, 0] = motion.force[p, 1] = 0.0
     for c in range(count):
@@ -251,7 +261,7 @@ def _step(motion, mu, pressure, pace, counters, stop):
 
 
 @allocating_part
-def _swept(motion, problem, mu, pace, force, velocity, dilation, dt, counters, stop):
+def _swept(motion, problem, mu, pace, force, velocity, dilation, dt, counters, stop, lanes):
     """Sweep until the violation of the contact laws is small enough; return λ.
 
     If that is not reached, the step uses the forces with the smallest violation: at large μ a few
@@ -260,33 +270,36 @@ def _swept(motion, problem, mu, pace, force, velocity, dilation, dt, counters, s
     Otherwise the jitter would shake the packing and delay rest.
     """
     count = force.shape[0]
-    order, factor, lasting = np.arange(count), motion.pace[1], motion.pace[1]
+    factor, lasting = motion.pace[1], motion.pace[1]
     cautious = max(LEAST_RELAXATION, 1.6 - mu)
     _scale(problem, factor)
+    order = _ordered(problem, force, velocity, lanes)
     best, best_force, best_velocity, best_dilation = np.inf, force, velocity, dilation
     least, looks, breach = np.inf, 0, np.inf
     for done in range(1, pace.sweeps + 1):
         if done > pace.sweeps - pace.settling and factor > LEAST_RELAXATION:
-            _scale(problem, LEAST_RELAXATION / factor)
+            _rescale(problem, order, LEAST_RELAXATION / factor)
             factor = LEAST_RELAXATION
-        dilation, _, _ = sweep(problem, order, mu, force, velocity, dilation, ONE)
+        dilation = _once(problem, order, mu, force, velocity, dilation)
         counters[SWEEPS] += 1
         counters[UPDATES] += count
         if stop[0]:
             break
         if done % LOOK and done > 3 and done < pace.sweeps:
             continue
-        breach = _breach(problem, mu, force, velocity, dilation, factor)
-        if breach <= max(pace.accuracy * _fastest(problem, force, velocity), ROUNDING / dt):
+        breach, speed = _breached(problem, order, mu, force, velocity, dilation, factor)
+        if breach <= max(pace.accuracy * speed, ROUNDING / dt):
+            _update(order, force, velocity)
             break
         if breach < best:
+            _update(order, force, velocity)
             best, best_dilation = breach, dilation
             best_force, best_velocity = force.copy(), velocity.copy()
         looks += 1
         if breach < FALLEN * least:
             least, looks = breach, 0
         elif looks >= STALLED and factor > cautious:
-            _scale(problem, CAUTION)
+            _rescale(problem, order, CAUTION)
             factor, least, looks = CAUTION * factor, breach, 0
             lasting = factor
     else:
@@ -296,6 +309,62 @@ def _swept(motion, problem, mu, pace, force, velocity, dilation, dt, counters, s
         _copy(velocity, best_velocity)
     motion.pace[1] = min(COURAGE * lasting, MOST_RELAXATION)
     return dilation
+
+
+@by_type
+def _ordered(problem, force, velocity, lanes):
+    """The order of a sweep over single contacts, or their groups."""
+    if len(lanes) == 1:
+        return lambda problem, force, velocity, lanes: np.arange(force.shape[0])
+    return lambda problem, force, velocity, lanes: grouped(problem, force, velocity)
+
+
+@by_type
+def _once(problem, order, mu, force, velocity, dilation):
+    """λ after one sweep, which changes the forces and velocities, or those of groups."""
+    if _single(order):
+        return lambda problem, order, mu, force, velocity, dilation: sweep(
+            problem, order, mu, force, velocity, dilation, ONE
+        )[0]
+    return lambda problem, order, mu, force, velocity, dilation: sweep_groups(order, mu, dilation)
+
+
+@by_type
+def _breached(problem, order, mu, force, velocity, dilation, factor):
+    """Largest violation of the contact laws, and largest velocity component of carrying grains."""
+    if _single(order):
+        return lambda problem, order, mu, force, velocity, dilation, factor: (
+            _breach(problem, mu, force, velocity, dilation, factor),
+            _fastest(problem, force, velocity),
+        )
+    return lambda problem, order, mu, force, velocity, dilation, factor: breach_of_groups(
+        order, mu, dilation, factor
+    )
+
+
+@by_type
+def _update(order, force, velocity):
+    """Set forces and velocities to those that sweeps have reached."""
+    if _single(order):
+        return lambda order, force, velocity: None
+    return lambda order, force, velocity: ungroup(order, force, velocity)
+
+
+@by_type
+def _rescale(problem, order, factor):
+    """Multiply the relaxation factor."""
+    if _single(order):
+        return lambda problem, order, factor: _scale(problem, factor)
+
+    def both(problem, order, factor):
+        _scale(problem, factor)
+        stiffen(order, factor)
+
+    return both
+
+
+def _single(order):
+    return isinstance(order, types.Array | np.ndarray)
 
 
 @within

@@ -26,10 +26,11 @@ from granforce.motion.step import Step
 from granforce.quantities import ALL_CONTACTS, FORCE, Field
 from granforce.records import InputError, Packing, float_array, random_seed, whole
 from granforce.system import cancelling
-from granforce.tolerances import NO_EQUILIBRIUM, SEEN_CARRYING
+from granforce.tolerances import LARGE, NO_EQUILIBRIUM, SEEN_CARRYING
 from granforce.types import Cancel, Floats, Integers, Mask
 
-# Standard deviations of the noise on each force (in ⟨f_n⟩), and number of draws for each.
+# Standard deviations of the noise on each force (in ⟨f_n⟩), and draws for each of them: fewer beyond
+# LARGE grains, as each draw puts noise on all forces.
 NOISE, DRAWS = (1e-4, 1e-2), 3
 # Implicit steps within which a network must come to rest.
 MOST_STEPS = 500
@@ -63,7 +64,7 @@ def rest(
     packing: Packing | Ensemble,
     *,
     noise: tuple[float, ...] = NOISE,
-    draws: int = DRAWS,
+    draws: int | None = None,
     seed: int = 0,
     cancel: Cancel | None = None,
     **conditions: Any,
@@ -80,8 +81,9 @@ def rest(
         A Packing with forces, of any origin, or its Ensemble.
     noise : tuple of float, default (0.0001, 0.01)
         Standard deviations of the normal noise on every component, in ⟨f_n⟩.
-    draws : int, default 3
-        Number of draws for each of them.
+    draws : int, optional
+        Number of draws for each of them. By default 3, and 3000/N (at least one) for more than 1000
+        grains, as each draw puts noise on all forces.
     seed : int, default 0
         Seed of the noise.
     cancel : callable, optional
@@ -101,11 +103,14 @@ def rest(
     InputError
         If the packing has no forces, and for conditions with an Ensemble.
     """
-    draws = whole(draws, "draws", least=1)
+    if draws is not None:
+        draws = whole(draws, "draws", least=1)
     noise = tuple(float(level) for level in float_array(noise, (-1,), "noise"))
     if min(noise, default=0.0) < 0:
         raise InputError("noise must be standard deviations ≥ 0")
     S, step, first = _from_its_own(packing, conditions)
+    grains = len(S.packing.r)
+    draws = max(1, DRAWS * min(LARGE, grains) // grains) if draws is None else draws
     forces = S.original / S.force_scale
     if not first.at_rest:
         none = np.zeros((len(noise), draws), dtype=bool)

@@ -181,6 +181,21 @@ def _plain_less(values, a, b):
     return np.array([_plain_fma(-a, one, other) for one, other in zip(b, values, strict=True)])
 
 
+def _plain_gather(array, places, first, lanes):
+    rows = array[places[first : first + len(lanes)]]
+    return rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 2].copy()
+
+
+def _plain_scatter(array, places, first, lanes, values):
+    array[places[first : first + len(lanes)], :3] = np.stack(values, axis=1)
+
+
+def _plain_total(a):
+    while len(a) > 1:
+        a = a[: len(a) // 2] + a[len(a) // 2 :]
+    return a[0]
+
+
 def _plain_same(lanes, value):
     return np.float64(value) if len(lanes) == 1 else np.full(len(lanes), float(value))
 
@@ -290,6 +305,88 @@ def less(typing, values, a, b):
         return _joined(builder, products)
 
     return values(values, a, b), emit
+
+
+# Doubles in a row that `gather` loads whole: a vector of three would take two instructions.
+ROW = 4
+
+
+@instruction(_plain_gather)
+def gather(typing, array, places, first, lanes):
+    """The first three numbers of an array's rows (…, ROW), which `places` lists from `first` on."""
+
+    def emit(context, builder, signature, args):
+        rows = [builder.load(p, align=8) for p in _rows(context, builder, signature, args)]
+        fours = [_transposed(builder, rows[k : k + ROW]) for k in range(0, len(rows), ROW)]
+        every = list(range(lanes.count))
+        numbers = [_shuffled(builder, low, high, every) for low, high in zip(*fours, strict=True)]
+        return cgutils.pack_array(builder, numbers[:3])
+
+    return types.UniTuple(_number(lanes), 3)(array, places, types.int64, lanes), emit
+
+
+@instruction(_plain_scatter)
+def scatter(typing, array, places, first, lanes, values):
+    """Set what `gather` returns; of equal places, the last one counts."""
+
+    def emit(context, builder, signature, args):
+        places, numbers = _rows(context, builder, signature, args), _apart(builder, args[4])
+        for first in range(0, len(places), ROW):
+            some = list(range(first, first + ROW))
+            four = [_shuffled(builder, number, number, some) for number in [*numbers, numbers[2]]]
+            for place, row in zip(places[first:], _transposed(builder, four), strict=False):
+                builder.store(row, place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, places, types.int64, lanes, values), emit
+
+
+def _rows(context, builder, signature, args):
+    """Pointers to rows; args: the array, the places of rows, the first of them, the lanes."""
+    data, places = (
+        context.make_array(signature.args[k])(context, builder, args[k]).data for k in range(2)
+    )
+    word, row = ir.IntType(64), ir.VectorType(_DOUBLE, ROW).as_pointer()
+    listed = [builder.add(args[2], word(k)) for k in range(signature.args[3].count)]
+    rows = [builder.load(builder.gep(places, [place])) for place in listed]
+    firsts = [builder.gep(data, [builder.mul(number, word(ROW))]) for number in rows]
+    return [builder.bitcast(first, row) for first in firsts]
+
+
+def _transposed(builder, rows):
+    """Four vectors of four: number k of each, for every k."""
+    pairs = [
+        _shuffled(builder, *two, places)
+        for two in (rows[:2], rows[2:])
+        for places in ([0, 4, 2, 6], [1, 5, 3, 7])
+    ]
+    return [
+        _shuffled(builder, *two, places)
+        for places in ([0, 1, 4, 5], [2, 3, 6, 7])
+        for two in (pairs[::2], pairs[1::2])
+    ]
+
+
+def _shuffled(builder, a, b, places):
+    """The numbers of two vectors, counted on from a to b, at these places."""
+    index = ir.IntType(32)
+    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(index, len(places)), places))
+
+
+@instruction(_plain_total)
+def total(typing, a):
+    """The sum over all lanes."""
+
+    def emit(context, builder, signature, args):
+        sums, width = args[0], a.width
+        while width > 1:
+            width //= 2
+            low, high = list(range(width)), list(range(width, 2 * width))
+            halves = [_shuffled(builder, sums, sums, half) for half in (low, high)]
+            sums = builder.fadd(*halves)
+        return builder.extract_element(sums, ir.IntType(32)(0))
+
+    return types.float64(a), emit
 
 
 @instruction(_plain_same)

@@ -20,12 +20,12 @@ import numpy.typing as npt
 from granforce.fields import record
 from granforce.motion import contact_dynamics as dynamics
 from granforce.motion.rest import Rest, rest
-from granforce.numerics.lanes import allocating
+from granforce.numerics.lanes import MANY, ONE, allocating
 from granforce.packing import pair_list
 from granforce.packing.closing import margin, prescribed_of, shrink_to_isostatic
 from granforce.packing.pair_list import cell_of, relisted
 from granforce.packing.pouring import poured
-from granforce.packing.settling import SEVERAL, come_to_rest, same_state, slump
+from granforce.packing.settling import come_to_rest, same_state, slump
 from granforce.records import (
     InputError,
     NotJammedError,
@@ -43,11 +43,12 @@ from granforce.records import (
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
 from granforce.system.wording import number
+from granforce.tolerances import LARGE
 from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 INITIAL_FRACTION = 0.5
 # The last phase is tried every CHECK_EVERY steps, once no grain's momentum changes by more than
-# NEARLY_BALANCED in a step, in ⟨f_n⟩; beyond SEVERAL disks, later by the square of their number, as
+# NEARLY_BALANCED in a step, in ⟨f_n⟩; beyond LARGE disks, later by the square of their number, as
 # the many places where grains still move need many systems.
 CHECK_EVERY = 25
 NEARLY_BALANCED = 0.02
@@ -155,7 +156,7 @@ def pack(
         to the fastest carrying grain.
     drag_below : float, optional
         Drag takes the place of inertia once no grain's momentum changes by more than this in a
-        step, in ⟨f_n⟩; by default 0.02, less from 2000 disks on. Only for μ above 10⁻⁴.
+        step, in ⟨f_n⟩; by default 0.02, less from 1000 disks on. Only for μ above 10⁻⁴.
     box : {"square", "isotropic", "floor", "smooth floor"}
         Sides and tilt of an isotropic box follow the stress until σ_xx = σ_yy = P0 and σ_xy = 0:
         jammed against shear too. On a floor, disks of weight π r² are poured one by one in a layer
@@ -219,7 +220,7 @@ def pack(
     settling = sweeps // SETTLING if mu >= SETTLED_FROM else 0
     pace = dynamics.Pace(box_mass, SHORTEST * dt, dt, STRIDE, int(sweeps), settling, accuracy)
     settings = {"dt": dt, "box_mass": box_mass, "sweeps": sweeps, "accuracy": accuracy}
-    slow = NEARLY_BALANCED * min(1.0, (SEVERAL / n) ** 2) if drag_below is None else drag_below
+    slow = NEARLY_BALANCED * min(1.0, (LARGE / n) ** 2) if drag_below is None else drag_below
     counters = np.zeros(4, dtype=np.int64)
     work = dict.fromkeys(WORK, 0)
     look = None if watch is None else _looking(watch, unit, pressure, counters)
@@ -499,7 +500,8 @@ def _advance(
     while (left := int(goal - counters[dynamics.STEPS])) > 0:
         steps = left if look is None else min(left, WATCH_EVERY)
         overlap, unbalance = dynamics.advance(
-            motion, mu, 1.0, pace, pair_list.MOVED, steps, counters, cancelling.flag()
+            *(motion, mu, 1.0, pace, pair_list.MOVED, steps, counters, cancelling.flag()),
+            ONE if len(motion.r) <= LARGE else MANY,
         )
         cancelling.check("compaction")
         if motion.drift[0] > pair_list.MOVED:

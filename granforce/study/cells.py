@@ -10,16 +10,16 @@ from typing import Any, NamedTuple
 import xarray as xr
 
 from granforce.packing.compaction import NEARLY_FRICTIONLESS
-from granforce.packing.settling import SEVERAL
 from granforce.records import InputError
 from granforce.study.keys import Parameters, canonical
 from granforce.study.store import Entry, Store
 from granforce.system import cancelling
+from granforce.tolerances import LARGE
 from granforce.types import Cancel, Progress
 
-# Versions of the algorithms that make packings certified to be at rest: of dynamics alone, the same
-# for more than SEVERAL disks, and of small friction, where linear programs finish them.
-PACKING_VERSION, LARGE_VERSION, FINISHED_VERSION = 7, 9, 8
+# Versions of the algorithms that make packings certified to be at rest: of dynamics alone, of small
+# friction, where linear programs finish them, and of more than LARGE disks.
+PACKING_VERSION, FINISHED_VERSION, LARGE_VERSION = 7, 8, 10
 
 
 def packing_version(mu: float, disks: int) -> int:
@@ -28,9 +28,9 @@ def packing_version(mu: float, disks: int) -> int:
     It is among the parameters of a packing, so that it enters the key of everything that depends on
     the packing.
     """
-    if mu > NEARLY_FRICTIONLESS:
-        return LARGE_VERSION if disks > SEVERAL else PACKING_VERSION
-    return FINISHED_VERSION if mu > 0 else PACKING_VERSION
+    if disks > LARGE:
+        return LARGE_VERSION
+    return FINISHED_VERSION if 0 < mu <= NEARLY_FRICTIONLESS else PACKING_VERSION
 
 
 def _unchanged(parameters: Parameters, dataset: xr.Dataset) -> Parameters:

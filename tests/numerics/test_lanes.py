@@ -4,7 +4,21 @@ import numpy as np
 import pytest
 from numba import njit
 
-from granforce.numerics.lanes import MANY, ONE, fma, larger, load, pick, root, store
+from granforce.numerics.lanes import (
+    LANES,
+    MANY,
+    ONE,
+    ROW,
+    fma,
+    gather,
+    larger,
+    load,
+    pick,
+    root,
+    scatter,
+    store,
+    total,
+)
 
 
 @njit(error_model="numpy")
@@ -34,3 +48,20 @@ def test_a_number_that_meets_lanes_stands_for_itself_in_each(lanes, rng):
     wanted = np.where(x < 0.5, -1.0, np.maximum(2 * x - 0.75, 0.3))
     wanted[0] = 0.3
     assert np.array_equal(found, wanted)
+
+
+@njit(error_model="numpy")
+def doubled(rows, places, sums):
+    for first in range(0, len(places), LANES):
+        x, y, z = gather(rows, places, first, MANY)
+        sums[first // LANES] = total(x)
+        scatter(rows, places, first, MANY, (2.0 * x, 2.0 * y, 2.0 * z))
+
+
+def test_rows_are_gathered_changed_and_put_back(rng):
+    rows, sums = rng.normal(size=(40, ROW)), np.empty(2)
+    before, places = rows.copy(), rng.permutation(40)[: 2 * LANES]
+    doubled(rows, places, sums)
+    assert sums == pytest.approx(before[places, 0].reshape(2, LANES).sum(axis=1))
+    expected = before[:, :3] * np.where(np.isin(np.arange(40), places), 2, 1)[:, None]
+    assert np.array_equal(rows[:, :3], expected)
