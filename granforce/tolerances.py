@@ -102,4 +102,4 @@ LOCKED = 1e-6
 
 # Packings of more disks are large: sweeps update contacts in groups, the test of rest has fewer
 # draws, and the last phase of a compaction begins later and gives up earlier.
-LARGE = 1000
+MANY_DISKS = 1000

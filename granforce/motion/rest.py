@@ -26,11 +26,11 @@ from granforce.motion.step import Step
 from granforce.quantities import ALL_CONTACTS, FORCE, Field
 from granforce.records import InputError, Packing, float_array, random_seed, whole
 from granforce.system import cancelling
-from granforce.tolerances import LARGE, NO_EQUILIBRIUM, SEEN_CARRYING
+from granforce.tolerances import MANY_DISKS, NO_EQUILIBRIUM, SEEN_CARRYING
 from granforce.types import Cancel, Floats, Integers, Mask
 
-# Standard deviations of the noise on each force (in ⟨f_n⟩), and draws for each of them: fewer beyond
-# LARGE grains, as each draw puts noise on all forces.
+# Standard deviations of the noise on each force (in ⟨f_n⟩), and draws for each of them: fewer for
+# more than MANY_DISKS grains, as each draw puts noise on all forces.
 NOISE, DRAWS = (1e-4, 1e-2), 3
 # Implicit steps within which a network must come to rest.
 MOST_STEPS = 500
@@ -110,7 +110,7 @@ def rest(
         raise InputError("noise must be standard deviations ≥ 0")
     S, step, first = _from_its_own(packing, conditions)
     grains = len(S.packing.r)
-    draws = max(1, DRAWS * min(LARGE, grains) // grains) if draws is None else draws
+    draws = max(1, DRAWS * min(MANY_DISKS, grains) // grains) if draws is None else draws
     forces = S.original / S.force_scale
     if not first.at_rest:
         none = np.zeros((len(noise), draws), dtype=bool)

@@ -43,12 +43,12 @@ from granforce.records import (
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
 from granforce.system.wording import number
-from granforce.tolerances import LARGE
+from granforce.tolerances import MANY_DISKS
 from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 INITIAL_FRACTION = 0.5
 # The last phase is tried every CHECK_EVERY steps, once no grain's momentum changes by more than
-# NEARLY_BALANCED in a step, in ⟨f_n⟩; beyond LARGE disks, later by the square of their number, as
+# NEARLY_BALANCED in a step, in ⟨f_n⟩; beyond MANY_DISKS, later by the square of their number, as
 # the many places where grains still move need many systems.
 CHECK_EVERY = 25
 NEARLY_BALANCED = 0.02
@@ -220,7 +220,7 @@ def pack(
     settling = sweeps // SETTLING if mu >= SETTLED_FROM else 0
     pace = dynamics.Pace(box_mass, SHORTEST * dt, dt, STRIDE, int(sweeps), settling, accuracy)
     settings = {"dt": dt, "box_mass": box_mass, "sweeps": sweeps, "accuracy": accuracy}
-    slow = NEARLY_BALANCED * min(1.0, (LARGE / n) ** 2) if drag_below is None else drag_below
+    slow = NEARLY_BALANCED * min(1.0, (MANY_DISKS / n) ** 2) if drag_below is None else drag_below
     counters = np.zeros(4, dtype=np.int64)
     work = dict.fromkeys(WORK, 0)
     look = None if watch is None else _looking(watch, unit, pressure, counters)
@@ -501,7 +501,7 @@ def _advance(
         steps = left if look is None else min(left, WATCH_EVERY)
         overlap, unbalance = dynamics.advance(
             *(motion, mu, 1.0, pace, pair_list.MOVED, steps, counters, cancelling.flag()),
-            ONE if len(motion.r) <= LARGE else MANY,
+            ONE if len(motion.r) <= MANY_DISKS else MANY,
         )
         cancelling.check("compaction")
         if motion.drift[0] > pair_list.MOVED:

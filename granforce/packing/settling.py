@@ -40,7 +40,7 @@ from granforce.records import (
     with_friction,
 )
 from granforce.system import cancelling
-from granforce.tolerances import CLOSED, LARGE, SAME_STATE, TOUCHING
+from granforce.tolerances import CLOSED, MANY_DISKS, SAME_STATE, TOUCHING
 from granforce.types import Floats, Integers, Mask
 
 # Softness ε of the overdamped motion: the overlap of a pressing contact, in largest radii. At 10⁻⁴
@@ -53,7 +53,7 @@ STRIDE = 0.1 * SOFTNESS**0.5
 # Softness of disks that slump on a floor, and how often their linear systems may be used up.
 SOFTER, SLUMPS = 1e-4, 50
 # Implicit steps between two calls of `look`; linear systems after which the dynamics takes over:
-# fewer beyond LARGE disks, in inverse proportion to their number, as a system then costs far more
+# fewer beyond MANY_DISKS, in inverse proportion to their number, as a system then costs far more
 # than a sweep.
 STEPS_A_LOOK, MOST_SYSTEMS = 50, 500
 FIRST_PACE = 100.0
@@ -153,7 +153,7 @@ def _creep(
     stride = STRIDE * (softness / SOFTNESS) ** 0.5
     pace = FIRST_PACE
     counts, near, ended = np.zeros(3, dtype=np.int64), None, overdamped.MOVED
-    fewer = min(1.0, LARGE / len(motion.r))
+    fewer = min(1.0, MANY_DISKS / len(motion.r))
     steps = max(1, round(fewer * STEPS_A_LOOK))
     while counts[overdamped.SYSTEMS] < fewer * MOST_SYSTEMS:
         cancelling.check("compaction")

@@ -14,11 +14,11 @@ from granforce.records import InputError
 from granforce.study.keys import Parameters, canonical
 from granforce.study.store import Entry, Store
 from granforce.system import cancelling
-from granforce.tolerances import LARGE
+from granforce.tolerances import MANY_DISKS
 from granforce.types import Cancel, Progress
 
 # Versions of the algorithms that make packings certified to be at rest: of dynamics alone, of small
-# friction, where linear programs finish them, and of more than LARGE disks.
+# friction, where linear programs finish them, and of more than MANY_DISKS disks.
 PACKING_VERSION, FINISHED_VERSION, LARGE_VERSION = 7, 8, 10
 
 
@@ -28,7 +28,7 @@ def packing_version(mu: float, disks: int) -> int:
     It is among the parameters of a packing, so that it enters the key of everything that depends on
     the packing.
     """
-    if disks > LARGE:
+    if disks > MANY_DISKS:
         return LARGE_VERSION
     return FINISHED_VERSION if 0 < mu <= NEARLY_FRICTIONLESS else PACKING_VERSION
 

@@ -22,7 +22,7 @@ from granforce.packing.compaction import (
 from granforce.packing.neighbours import find_pairs, separations
 from granforce.packing.pair_list import _leant_back, cell_of, relisted
 from granforce.records import Cancelled, InputError, NotJammedError, make_contacts, make_packing
-from granforce.tolerances import CLOSED, LARGEST_FRICTION, TOUCHING
+from granforce.tolerances import CLOSED, LARGEST_FRICTION, MANY_DISKS, TOUCHING
 
 
 def check(packing):
@@ -78,6 +78,14 @@ def test_packings_are_at_rest_and_stay_there_with_noise(mu):
     certificate = rest(packing, seed=1)
     assert certificate.at_rest and certificate.stayed.all() and certificate.distance < 1e-6
     assert packing.info["distance_to_rest"] < 1e-6
+
+
+def test_large_packings_are_at_rest_in_more_draws_than_they_were_tested_with():
+    packing = pack(MANY_DISKS + 1, 0.1)
+    check(packing)
+    assert rest(packing).stayed.shape == (2, 2)
+    certificate = rest(packing, draws=3, seed=1)
+    assert certificate.at_rest and certificate.stayed.all() and certificate.distance < 1e-6
 
 
 def test_a_state_that_fails_the_test_of_rest_again_and_again_ends_the_compaction(monkeypatch):
