@@ -48,8 +48,8 @@ from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 INITIAL_FRACTION = 0.5
 # The last phase is tried every CHECK_EVERY steps, once no grain's momentum changes by more than
-# NEARLY_BALANCED in a step, in ⟨f_n⟩; beyond MANY_DISKS, later by the square of their number, as
-# the many places where grains still move need many systems.
+# NEARLY_BALANCED in a step, in ⟨f_n⟩; beyond MANY_DISKS, later by the square of their number, and
+# each time after twice as many steps, as the many places where grains still move need many systems.
 CHECK_EVERY = 25
 NEARLY_BALANCED = 0.02
 # Longest time step, and most sweeps in it. From SETTLED_FROM on, steps of 0.1 leave wider intervals
@@ -227,14 +227,17 @@ def pack(
     if look is not None:
         look(motion, np.inf)
     tested: Packing | None = None
-    repeats = 0
+    repeats, wait, next_trial = 0, CHECK_EVERY, 0
     while True:
         motion, overlap, unbalance = _advance(motion, mu, pace, counters, work, look)
         step = int(counters[dynamics.STEPS])
         if progress is not None:
             progress(step, None)
         cancelling.check("compaction")
-        motion, finished, certificate = _finish(motion, mu, unbalance <= slow, work, look)
+        is_slow = unbalance <= slow and step >= next_trial
+        motion, finished, certificate = _finish(motion, mu, is_slow, work, look)
+        if is_slow and n > MANY_DISKS:
+            next_trial, wait = step + wait, 2 * wait
         if finished is not None and certificate is not None:
             if certificate.at_rest:
                 break
