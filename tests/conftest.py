@@ -17,7 +17,7 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 # What makes and pushes packings, and all else: each takes half of the time to compile.
 KERNELS = (
-    "warm_up({kinds.PERTURBATION})",
+    "import granforce as gf\nwarm_up({kinds.PERTURBATION})\ngf.pack(1001, 0.1, 2)",
     "import granforce as gf\n"
     "warm_up(set(kinds.KINDS.values()) - {kinds.PERTURBATION}, reference('n100_mu0.1_s11'))\n"
     "round = gf.pack(12, 0.3, box='isotropic')\n"

@@ -81,7 +81,7 @@ def test_packings_are_at_rest_and_stay_there_with_noise(mu):
 
 
 def test_large_packings_are_at_rest_in_more_draws_than_they_were_tested_with():
-    packing = pack(MANY_DISKS + 1, 0.1)
+    packing = pack(MANY_DISKS + 1, 0.1, 2)
     check(packing)
     assert rest(packing).stayed.shape == (2, 2)
     certificate = rest(packing, draws=3, seed=1)
