@@ -54,7 +54,7 @@ export class Push extends PackingExperiment {
 
   get facts() {
     const { path: { contact, opened, slid, number, displacement }, packing, limits, moving, before, pushed } = this, count = (mask) => mask.reduce((sum, v) => sum + v, 0)
-    const k = packing.contact.indexOf(contact), sinking = [packing.i[k], packing.j[k]].every((disk) => displacement[2 * disk + 1] < 0)
+    const sinking = [packing.i[contact], packing.j[contact]].every((disk) => displacement[2 * disk + 1] < 0)
     return {
       ...this.counted(packing), number, moving, high: this.limit, carried: before[contact], opened: count(opened), slid: count(slid),
       pushed, sinking, limits: limits.map(({ value }) => value),
