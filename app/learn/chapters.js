@@ -57,7 +57,7 @@ function counted({ contacts, disks, equations, free }, pressed) {
 export const CHAPTERS = [
   {
     name: "ladder", title: "A ladder", heading: "Which will it be?",
-    text: ({ mu }) => `A ladder of weight 1 leans against a rough wall on a rough floor: friction is at most μ = ${mu} times the normal force (pale wedges). A mechanics course solves it without friction at the wall. With it, four forces are unknown, two at each end, and there are three equations of balance.`,
+    text: ({ mu }) => `A ladder of weight 1 leans against a rough wall on a rough floor: friction is at most μ = ${mu} times the normal force (blue wedges). A mechanics course solves it without friction at the wall. With it, four forces are unknown, two at each end, and there are three equations of balance.`,
     ask: "The arrows show one solution. How large is the wall’s normal force?",
     doing: () => "Drag the dot as far as it goes, to both sides, or drag an arrow. Wherever you stop, the ladder is in balance.",
     verdict: ({ low, high }, prediction) => ({
@@ -75,7 +75,7 @@ export const CHAPTERS = [
     name: "groove", title: "One disk in a groove", heading: "How hard does the wall press?",
     text: ({ mu }) => `A disk of weight 1 lies between two walls. Each wall exerts a normal force on it and a friction force along the wall, at most ${mu} times the normal force. Four unknown forces, three equations of balance: one number stays free.`,
     ask: "How large can the left wall’s normal force become?",
-    doing: () => "Drag the dot to the right as far as it goes, or drag an arrow. All forces stay in balance; a wedge turns dark where its contact is about to slip.",
+    doing: () => "Drag the dot to the right as far as it goes, or drag an arrow. All forces stay in balance; a wedge turns grey where its contact is about to slip.",
     see: ({ low, high, mu }) => [
       `At ${two(high)} the disk would slip upwards if friction did not pull it down along both walls, and friction gives ${two(mu * high)} at most: ${mu} × ${two(high)}. At ${two(low)} friction holds the disk up. So each wall can press harder than the disk weighs.`,
       "Each point of the bar, S, is one set of forces that holds the disk. Which one is real depends on how the disk was pressed in and how it deforms, if only by a hair; we call disks rigid to leave both open. Now change the friction: at which μ is S one point, and from which μ on has it no end?",
@@ -101,7 +101,7 @@ export const CHAPTERS = [
     name: "thirteen", title: "Thirteen disks", heading: "How strong can one contact get?",
     text: ({ contacts, equations, free, disks, start, mu, mean }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations (counted later): S has ${free} dimensions. No screen can show them, so the plot has two of the forces as axes. The green one starts at ${two(start)}; the mean of all is ${two(mean)}.`,
     ask: "How large can the green force become?",
-    doing: () => "Drag the dot to the right as far as it goes, or drag an arrow. All disks stay in balance. Dark: a contact is about to slip (wedge) or to open (ring).",
+    doing: () => "Drag the dot to the right as far as it goes, or drag an arrow. All disks stay in balance. Grey wedge: a contact is about to slip; ring: about to open.",
     see: ({ low, high, free, others }) => [
       `At ${two(high)} so many contacts are about to open or to slip that none of the ${free} numbers is free any more. From ${two(low)} to ${two(high)} every value is possible, although no disk moves.`,
       `${others ? "The dot stayed, but the other forces changed. So the plot is a shadow of S: as in the shadow of a body, many points lie behind each of its points."
@@ -114,7 +114,7 @@ export const CHAPTERS = [
   },
   {
     name: "four-hundred", title: "Four hundred disks", heading: "Grab one force",
-    text: ({ all, disks, mu, start, contacts, free }) => `${all} disks at μ = ${mu}; ${all - disks} pale ones carry nothing. Lines join disks in contact, thicker for larger forces. As before, 2 × ${contacts} forces − (3 × ${disks} − 1) equations = ${free} free numbers: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean.`,
+    text: ({ all, disks, mu, start, contacts, free }) => `${all} disks at μ = ${mu}; ${all - disks} faint ones carry nothing. Lines join disks in contact, thicker for larger forces. As before, 2 × ${contacts} forces − (3 × ${disks} − 1) equations = ${free} free numbers: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean.`,
     ask: "How large can you make this force while no disk moves?",
     doing: () => "Drag the dot to the right, or the marked line upwards. Other lines follow: orange ones grow, blue ones shrink. Dots: about to slip; rings: about to open.",
     see: ({ high, opened, sliding, bare, changed, contacts, free }) => [
@@ -127,11 +127,11 @@ export const CHAPTERS = [
   },
   {
     name: "chance", title: "A random walk", heading: "How far does chance go?",
-    text: ({ low, high, states }) => `By hand, the green force goes from ${two(low)} to ${two(high)}. Pale: all it can be together with a violet force, a shadow of S. Now chance walks through S in ${states} steps. Each changes all forces at random and then corrects them until all disks are in balance: a new network, one point of S.`,
+    text: ({ low, high, states }) => `By hand, the green force goes from ${two(low)} to ${two(high)}. Blue: all it can be together with a violet force, a shadow of S. Now chance walks through S in ${states} steps. Each changes all forces at random and then corrects them until all disks are in balance: a new network, one point of S.`,
     ask: "What is the largest green force that chance finds?",
     doing: ({ step }) => `Press “Walk”, or drag the slider. Each dot is ${step > 1 ? `a network, one after about every ${step} steps` : "a step"}; network 0 is the one in which the packing came to rest.`,
     see: ({ part, share, free, between }) => [
-      `${between ? "The largest value came between two of the dots. " : ""}The walk covers ${percent(part)} of what is possible for the green force. Its dots fill ${percent(share)} of the pale area, far from the edge: to get there, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
+      `${between ? "The largest value came between two of the dots. " : ""}The walk covers ${percent(part)} of what is possible for the green force. Its dots fill ${percent(share)} of the blue area, far from the edge: to get there, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
       `A walk shows what is typical, not what is possible. And this is only a shadow: a part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S.`,
     ],
     x: { low: 0.5, high: 4, label: "green force (mean force = 1)" }, y: { low: 0, high: 3, label: "violet force" },

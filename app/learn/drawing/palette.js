@@ -1,5 +1,5 @@
 // Colours of the small scenes: blue for forces, green and violet for the two that are axes of S,
-// magenta for dragging, dark for limits, orange for motion.
+// magenta for dragging, grey for limits, orange for motion.
 
 /** Colours by their role, on dark or on white background. */
 export function palette(dark) {

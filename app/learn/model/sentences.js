@@ -51,7 +51,7 @@ export function legend(body) {
   const parts = scene.r.length < 4 ? "normal parts, " : ""
   const axes = h === 2 || h > 3 ? `; green, violet: ${parts}plotted on the right` : ""
   const heads = scene.r.length > 2 ? " (in opposite pairs)" : ""
-  return `blue: contact forces${heads}${axes}${body.crowded ? "" : "; wedge: where a force may point"}${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; dark wedge: friction at its limit" : ""}`
+  return `blue: contact forces${heads}${axes}${body.crowded ? "" : "; wedge: where a force may point"}${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; grey wedge: friction at its limit" : ""}`
 }
 
 /** Whether friction is at its limit at any contact. */
@@ -88,7 +88,7 @@ function equationsOf({ grains, r, pressing, box, equations }) {
 
 /** The meaning of the bars below; empty if there are none. */
 export function barred({ empty, h, scene }) {
-  return empty || !h || scene.idle ? "" : "The range of each normal force (pale), and its value now (red):"
+  return empty || !h || scene.idle ? "" : "The range of each normal force (bar), and its value now (red):"
 }
 
 /** Special features of a scene, besides its forces; empty for most. */
