@@ -52,8 +52,10 @@ def test_ending_in_motion_is_not_called_converged():
 
 
 def test_contact_updates_tell_whether_siconos_is_there():
-    rows = bench.contact_updates(n=30, mu=0.3, sweeps=40)
+    rows = bench.contact_updates(n=30, mu=0.3, sweeps=2000)
     assert rows[0]["solver"] == "granforce sweep" and rows[0]["ns_per_update"] > 0
+    assert rows[2]["solver"] == "granforce sweep, groups" and rows[2]["ratio"] > 0
+    assert float(rows[2]["note"].split()[-2]) < 1e-6
     assert rows[-1]["solver"] == "Siconos NSGS"
     assert ("absent" in rows[-1]["note"]) == (siconos.interpreter() is None)
 
