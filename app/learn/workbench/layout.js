@@ -1,10 +1,12 @@
 // The empty layout of the workbench.
 
+import { lastChapter } from "../../browser/local_storage.js"
+
 /** Its HTML; most: μ at the end of the slider. */
 export function layout(most) {
   return `
     <div class="strip">
-      <a href="?learn">◂ Lesson</a>
+      <a href="?learn=${lastChapter()}">◂ Lesson</a>
       <label>Scene <select class="name" aria-label="Scene"></select></label>
       <label class="mu">friction μ <input class="range" type="range" min="0" max="${most}" step="0.005" aria-label="friction μ">
         <input class="typed" inputmode="decimal" aria-label="μ"></label>
