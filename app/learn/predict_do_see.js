@@ -144,7 +144,7 @@ export class PredictDoSee {
 
   /** The answer next to the prediction, with its reason, the surprise and more. */
   answer(sentences) {
-    const { chapter: { x, verdict: judged }, experiment, prediction } = this, off = experiment.answer - prediction
+    const { chapter: { x, verdict: judged }, experiment, prediction } = this, off = this.named(experiment.answer) - this.named(prediction) // of the numbers shown
     const verdict = createElement("p", { className: "verdict" })
     const is = judged?.(experiment.facts, prediction) ?? { answer: `It is ${this.named(experiment.answer)}.`, so: x.log ? "" : Math.abs(off) < NEAR * (x.high - x.low) ? ": well done" : `, ${this.named(Math.abs(off))} too ${off > 0 ? "low" : "high"}` }
     verdict.append(createElement("b", { textContent: is.answer }), createElement("span", { textContent: ` You predicted ${this.named(prediction)}${is.so}.` }))
