@@ -104,7 +104,7 @@ export const CHAPTERS = [
     doing: () => "Drag the dot to the right as far as it goes, or drag an arrow. All disks stay in balance. Grey wedge: a contact is about to slip; ring: about to open.",
     see: ({ low, high, free, others }) => [
       `At ${two(high)} so many contacts are about to open or to slip that none of the ${free} numbers is free any more. From ${two(low)} to ${two(high)} every value is possible, although no disk moves.`,
-      `${others ? "The dot stayed, but the other forces changed. So the plot is a shadow of S: as in the shadow of a body, many points lie behind each of its points."
+      `${others ? "The dot stayed, the other forces changed: the plot is a shadow of S, with many points behind each of its points."
         : others === false ? "Here, at the very edge, there is only one set of forces. Move the dot inside, then change the others."
           : "The dot fixes two forces. And the others? Move it away from the edge, and press “Change the other forces”."} Then change the friction: how little is too little?`,
     ],

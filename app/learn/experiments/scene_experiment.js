@@ -70,7 +70,7 @@ export class SceneExperiment {
   /** Another friction: S is cut again, and explored anew. */
   turn(mu) {
     this.hand.cut(mu)
-    Object.assign(this, { way: [], others: null, varied: mu !== this.scene.mu })
+    Object.assign(this, { way: [], others: this.others || null, varied: mu !== this.scene.mu })
     this.end()
     this.changed()
   }
@@ -151,7 +151,7 @@ export class SceneExperiment {
   }
 
   moved() {
-    this.others = null
+    this.others ||= null
     this.way = hull([...(this.way.length ? this.way : [this.varied ? this.at : this.start]), this.at])
     this.answered ||= this.reached
     this.changed()
