@@ -130,8 +130,8 @@ export const CHAPTERS = [
     text: ({ low, high, states }) => `By hand, the green force goes from ${two(low)} to ${two(high)}. Blue: all it can be together with a violet force, a shadow of S. Now chance walks through S in ${states} steps. Each changes all forces at random and then corrects them until all disks are in balance: a new network, one point of S.`,
     ask: "What is the largest green force that chance finds?",
     doing: ({ step }) => `Press “Walk”, or drag the slider. Each dot is ${step > 1 ? `a network, one after about every ${step} steps` : "a step"}; network 0 is the one in which the packing came to rest.`,
-    see: ({ part, share, free, between }) => [
-      `${between ? "The largest value came between two of the dots. " : ""}The walk covers ${percent(part)} of what is possible for the green force. Its dots fill ${percent(share)} of the blue area, far from the edge: to get there, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
+    see: ({ part, share, free }) => [
+      `The walk covers ${percent(part)} of what is possible for the green force. Its dots fill ${percent(share)} of the blue area, far from the edge: to get there, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
       `A walk shows what is typical, not what is possible. And this is only a shadow: a part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S.`,
     ],
     x: { low: 0.5, high: 4, label: "green force (mean force = 1)" }, y: { low: 0, high: 3, label: "violet force" },
@@ -145,8 +145,8 @@ export const CHAPTERS = [
     see: ({ rows }) => {
       const most = rows.reduce((one, other) => (other.spread > one.spread ? other : one)), first = rows[0], last = rows.at(-1)
       return [
-        `At μ = ${first.mu}, ${first.free} numbers are free, but with little room each: forces vary by ${percent(first.spread)}. More friction gives more: ${percent(most.spread)} at μ = ${most.mu}.`,
-        `But the packing made at μ = ${last.mu} has only ${two(touching(last))} contacts per disk; at μ = ${first.mu} it was ${two(touching(first))}. So numbers are lost: ${most.free} are free at μ = ${most.mu}, ${last.free} at μ = ${last.mu}. S first grows wider and then loses its dimensions.`,
+        `At μ = ${first.mu}, ${first.free} numbers are free, but with little room each: forces vary by ${percent(first.spread)}. More friction gives more: ${percent(most.spread)} at μ = ${most.mu}, the most of these ${rows.length === 6 ? "six" : rows.length} packings.`,
+        `But contacts per disk fall from ${two(touching(first))} to ${two(touching(last))}: ${most.free} numbers are free at μ = ${most.mu}, ${last.free} at μ = ${last.mu}. S first grows wider and then loses its dimensions.`,
       ]
     },
     live: true,

@@ -3,7 +3,7 @@
 
 const NS = "http://www.w3.org/2000/svg"
 const PILL = { high: 26, letter: 6.8, padding: 18 } // px
-const GAP = 5 // px between a line and words next to it
+const GAP = 5, INSET = 12 // px between a line and words next to it, and between two axes and the dot at their ends
 const GRAB = 26 // px from the dot within which dragging does not move it
 const STEPS = 60, FAST = 5 // keyboard steps along an axis; with the Shift key, so many at once
 let plots = 0 // so far: names what clips them
@@ -59,6 +59,7 @@ export class QuantityPlot {
     this.further = element(svg, "path", { class: "further" })
     this.second = element(svg, "path", { class: "second" })
     this.seen = element(svg, "path", { class: "visited", ...clip })
+    this.names = element(svg, "g", { class: "names" })
     this.dots = element(svg, "path", { class: "dots" })
     this.lines = element(svg, "g", { class: "lines" })
     this.answer = this.flag("answer")
@@ -82,10 +83,10 @@ export class QuantityPlot {
     const { clientWidth: wide, clientHeight: high } = this.host
     if (!wide || !high) return
     this.svg.setAttribute("viewBox", `0 0 ${wide} ${high}`)
-    const left = this.axes.y ? 66 : 26, bottom = high - 54, end = wide - (this.axes.second ? 62 : 26)
+    const left = this.axes.y ? 66 : 26, bottom = high - 54, end = wide - (this.axes.second ? 62 : 26), pad = this.axes.y ? INSET : 0
     Object.assign(this, { wide, high, left, bottom, end, top: 44 })
-    this.x = new Scale(this.axes.x, left, end)
-    this.y = this.axes.y ? new Scale(this.axes.y, bottom - (this.hears.marker ? PILL.high + 16 : 10), this.top) : null // leaves room for a prediction below
+    this.x = new Scale(this.axes.x, left + pad, end - pad)
+    this.y = this.axes.y ? new Scale(this.axes.y, bottom - INSET, this.top) : null
     this.right = this.axes.second ? new Scale(this.axes.second, this.y.from, this.y.to) : null
     for (const [key, value] of Object.entries({ x: left, y: this.y?.to ?? 0, width: end - left, height: (this.y?.from ?? bottom) - (this.y?.to ?? 0) })) this.inside.setAttribute(key, value)
     this.drawAxes()
@@ -93,7 +94,7 @@ export class QuantityPlot {
   }
 
   /** Height of the drawing for a single quantity. */
-  get level() { return (this.top + this.bottom) / 2 - 8 }
+  get level() { return (this.top + this.bottom) / 2 + 4 }
 
   place([x, y]) { return [this.x.px(x), this.y ? this.y.px(y) : this.level] }
 
@@ -122,26 +123,29 @@ export class QuantityPlot {
 
   /**
    * state: {now: [x, y], words, marker: {value, words}, answer: {value, words}, seen, exact, dots}: seen and exact are
-   * lists of points, and so is dots; null hides a part. filled: they are areas; walk: only seen is a curve.
-   * second: points of a second quantity. lines: [{value, words}], named values, the first one a bound on the others.
+   * lists of points, and so is dots; null hides a part. filled: they are areas; walk, curve: seen is a thin or a thick line.
+   * second: points of a second quantity. names: [{at: [x, y], scale, words}] of curves. lines: [{value, words}], named values, the first one a bound on the others.
    */
   draw(state) {
     this.state = state
     if (!this.x) return
-    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], dots = [], second = [], filled = false, walk = false, lines = [] } = state
+    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], dots = [], second = [], filled = false, walk = false, curve = false, lines = [], names = [] } = state
     const path = (points, end = "") => (points.length ? `M${points.map((point) => this.place(point).map((v) => v.toFixed(1)).join()).join("L")}${end}` : "")
     for (const [part, points] of [[this.exact, exact], [this.seen, seen]]) {
-      const area = filled && !(walk && points === seen)
+      const area = filled && !((walk || curve) && points === seen)
       part.setAttribute("d", path(points, area && points.length > 2 ? "Z" : ""))
       part.classList.toggle("filled", area)
-      part.classList.toggle("thin", area !== filled)
+      part.classList.toggle("thin", walk && points === seen)
+      part.classList.toggle("curve", curve && points === seen)
     }
     this.further.setAttribute("d", this.beyond(exact))
-    this.second.setAttribute("d", second.map(([x, y]) => `M${this.x.px(x)} ${this.right.px(y)}h0`).join(""))
+    this.second.setAttribute("d", second.length ? `M${second.map(([x, y]) => `${this.x.px(x)} ${this.right.px(y)}`).join("L")}h0` : "")
+    this.names.replaceChildren()
+    for (const { at: [x, y], words, scale } of names) element(this.names, "text", { x: this.x.px(x) + 2 * GAP, y: this[scale].px(y) - GAP }).textContent = words
     this.drawLines(lines)
     this.dots.setAttribute("d", dots.map((point) => `M${this.place(point).map((v) => v.toFixed(1)).join()}h0`).join(""))
-    this.show(this.marker, marker, this.bottom - PILL.high - 8)
-    this.show(this.answer, answer, this.top - 38)
+    this.show(this.marker, marker && { ...marker, words: answer ? "" : marker.words })
+    this.show(this.answer, answer)
     this.dot.style.display = now ? "" : "none"
     if (now) {
       const [px, py] = this.place(now)
@@ -191,13 +195,13 @@ export class QuantityPlot {
     })
   }
 
-  /** A vertical line with a label. */
-  show({ group, line, box, text }, what, y) {
+  /** A vertical line, with a label on top if it has words. */
+  show({ group, line, box, text }, what) {
     group.style.display = what ? "" : "none"
     if (!what) return
-    const px = this.x.px(what.value), wide = what.words.length * PILL.letter + PILL.padding
+    const px = this.x.px(what.value), y = this.top - 38, wide = what.words ? what.words.length * PILL.letter + PILL.padding : 0
     const middle = Math.min(Math.max(px, (this.y ? this.left : 0) + wide / 2 + 2), this.wide - wide / 2 - 2)
-    for (const [key, value] of Object.entries({ x1: px, x2: px, y1: group === this.answer.group ? y : this.top - 8, y2: this.bottom })) line.setAttribute(key, value)
+    for (const [key, value] of Object.entries({ x1: px, x2: px, y1: what.words ? y : this.top - 8, y2: this.bottom })) line.setAttribute(key, value)
     for (const [key, value] of Object.entries({ x: middle - wide / 2, y, width: wide })) box.setAttribute(key, value)
     for (const [key, value] of Object.entries({ x: middle, y: y + 17.5 })) text.setAttribute(key, value)
     text.textContent = what.words

@@ -26,7 +26,7 @@ export class Chance extends PackingExperiment {
     const { packing, contact, share } = this, { least, largest, low, high } = packing
     return {
       ...this.counted(packing), low: least[contact], high: largest[contact], share, states: packing.states,
-      step: Math.round((packing.states - this.drawn[1].number) / (this.drawn.length - 2)), between: high[contact] - Math.max(...this.drawn.map(([x]) => x)) > 0.005,
+      step: Math.round((packing.states - this.drawn[1].number) / (this.drawn.length - 2)),
       part: (high[contact] - low[contact]) / (largest[contact] - least[contact]),
     }
   }

@@ -30,7 +30,7 @@ export class Friction extends PackingExperiment {
     this.network = Float32Array.from(this.asPacked(packing))
     this.before = this.asPacked(packing)
     this.shown = null
-    this.canvas.show(packing, packing.grabbed)
+    this.canvas.show(packing, null)
     this.answered ||= this.visited.size === this.stops.length
     this.changed()
   }
@@ -67,11 +67,11 @@ export class Friction extends PackingExperiment {
   finish({ x }) { for (const to of [x.low, x.high, this.answer]) this.drag(to) }
 
   get picture() {
-    const { stops, spreads, free, value, visited } = this, now = stops.indexOf(value), curve = stops.map((mu, k) => [mu, spreads[k]])
-    const been = ([mu]) => mu === value || visited.has(mu)
+    const { stops, spreads, free, value, visited } = this, now = stops.indexOf(value), top = stops.indexOf(this.answer), curve = stops.map((mu, k) => [mu, spreads[k]])
+    const been = ([mu]) => mu === value || visited.has(mu), seen = curve.filter(been)
     return {
-      now: curve[now], words: `μ = ${value}`, dots: curve.filter(been),
-      second: stops.map((mu, k) => [mu, free[k]]).filter(been),
+      now: curve[now], words: `μ = ${value}`, seen, dots: seen, curve: true, second: stops.map((mu, k) => [mu, free[k]]).filter(been),
+      names: this.answered ? [{ at: curve[top + 1], scale: "y", words: "forces vary by" }, { at: [stops[1], free[1]], scale: "right", words: "free numbers" }] : [],
     }
   }
 
