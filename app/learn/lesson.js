@@ -5,7 +5,7 @@ import { button, createElement } from "../browser/dom.js"
 import { keepChapter } from "../browser/local_storage.js"
 import { STILL } from "../browser/motion.js"
 import { plain } from "../browser/to_object.js"
-import { CHAPTERS } from "./chapters.js"
+import { CHAPTERS, SUMMARY } from "./chapters.js"
 import { palette } from "./drawing/palette.js"
 import { ClosingPicture } from "./drawing/closing_picture.js"
 import { PredictDoSee } from "./predict_do_see.js"
@@ -72,8 +72,8 @@ class Lesson {
     const chapter = CHAPTERS[number], turn = ++this.openings
     this.number = number
     keepChapter(chapter.name)
-    this.show()
     const parts = this.lay(chapter)
+    this.show()
     const { model, source } = this, palettes = () => plain(model.palettes)
     const experiment = new chapter.experiment(parts.picture, chapter.options, () => this.mechanism?.show(), palettes())
     this.experiment = experiment
@@ -108,14 +108,14 @@ class Lesson {
     voice.textContent = "Loading … The first time on a server, this can take a minute."
     const [picture, plot] = ["picture", "plot"].map((className) => createElement("figure", { className }))
     const knob = createElement("label", { className: "knob", hidden: true }), row = createElement("div", { className: "row" }), turn = createElement("span", { className: "turn" })
-    const next = last ? button("Your eight predictions ▾", () => after.scrollIntoView({ behavior: STILL.matches ? "auto" : "smooth" }))
+    const next = last ? button("", () => after.scrollIntoView({ behavior: STILL.matches ? "auto" : "smooth" }))
       : button("", () => this.go(number + 1), { innerHTML: `Next<span>: ${CHAPTERS[number + 1].title}</span> ▸` })
     turn.append(button("◂", () => this.go(number - 1), { ariaLabel: "Back", disabled: !number }), next)
     row.append(turn)
     const { pathname } = window.location, { scene } = chapter.options
-    const onwards = last ? `<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with this scene</a>` : ""
+    const onwards = last ? `${SUMMARY}<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with this scene</a>` : ""
     const after = createElement("div", { className: "after", innerHTML: onwards })
-    this.closing = last ? new ClosingPicture(after) : null
+    Object.assign(this, { next, closing: last ? new ClosingPicture(after) : null })
     const foot = createElement("div", { className: "foot" }) // always in view, as it says what to do next
     foot.append(voice, row)
     this.main.className = "waiting"
@@ -125,8 +125,10 @@ class Lesson {
     return { text, picture, plot, extra, knob, voice, row, foot, after, next }
   }
 
-  /** The list of chapters, with finished ones marked. */
+  /** The list of chapters, with finished ones marked, and whether the lesson is finished. */
   show() {
+    const missing = CHAPTERS.filter(({ name }) => !this.progress.of(name).done).length
+    if (this.closing) Object.assign(this.next, { disabled: missing > 0, textContent: missing ? `Your predictions: ${missing} missing` : "Your eight predictions ▾" })
     this.list.replaceChildren(...CHAPTERS.map(({ name, title }, k) => {
       const item = createElement("li", { className: this.progress.of(name).done ? "done" : "" }), link = item.appendChild(createElement("a", { textContent: title, href: this.address(name) }))
       if (k === this.number) {

@@ -57,7 +57,7 @@ export class Push extends PackingExperiment {
     const sinking = [packing.i[contact], packing.j[contact]].every((disk) => displacement[2 * disk + 1] < 0)
     return {
       ...this.counted(packing), number, moving, high: this.limit, carried: before[contact], opened: count(opened), slid: count(slid),
-      pushed, sinking, limits: limits.map(({ value }) => value),
+      pushed, sinking, limit: this.path.limit, limits: limits.map(({ value }) => value),
     }
   }
 
@@ -87,20 +87,15 @@ export class Push extends PackingExperiment {
     return moving ? Uint8Array.from(opened, (open, c) => (open ? OPENS : slid[c])) : super.limited
   }
 
+  /** The force of the line, against the push, and, once disks moved, S on it. */
   get picture() {
-    const { value, answered, limits, path } = this
-    const bound = { value: path.limit, words: `limit load ${path.limit.toFixed(2)}` }
-    return { now: [value, 0], seen: [[0, 0], [value, 0]], lines: answered ? [bound, ...limits.slice(1)] : [] }
-  }
-
-  /** S on the force of the line, against the push, and, once disks moved, the force of this network until then. */
-  get aside() {
-    const { options, path: { values, normal, band, contact, limit }, packing: { contacts }, limit: most, pushed } = this
+    const { value, answered, limits, network, path: { values, normal, band, contact, limit }, packing: { contacts } } = this
     const rows = Array.from({ length: band.length / 3 }, (_, k) => band.subarray(3 * k, 3 * k + 3)).filter((row) => row.every(Number.isFinite)) // not certified: next to the limit load
     const edge = (d) => rows.map((row) => [row[0], row[d]])
+    const now = [value, network[contact]], bound = { value: limit, words: `limit load ${limit.toFixed(2)}` }
     return {
-      axes: options, filled: true, walk: true, exact: [...edge(1), ...edge(2).reverse()], seen: pushed ? Array.from(values, (push, k) => [push, normal[k * contacts + contact]]) : [],
-      answer: pushed ? { value: most, words: `disks move: ${most.toFixed(2)}` } : null, lines: [{ value: limit, words: `S ends: ${limit.toFixed(2)}` }],
+      now, filled: true, curve: true, exact: answered ? [...edge(1), ...edge(2).reverse()] : [], seen: [...Array.from(values, (push, k) => [push, normal[k * contacts + contact]]).filter(([push]) => push < value), now],
+      lines: answered ? [bound, ...limits.slice(1)] : [],
     }
   }
 
