@@ -41,6 +41,8 @@ const BUTTONS = `
       <span class="hold-tools">
         <label title="normal force of the selected contact, in mean forces; enter a value to pull it there">fₙ
           <input class="force" type="number" min="0" step="any" aria-label="normal force of the selected contact, in mean forces"></label>
+        <button type="button" class="least" title="pull it to its least value">least</button>
+        <button type="button" class="largest" title="pull it to its largest value">largest</button>
         ${button("hold", "hold the selected contact at this force (H); press again to release it", "Hold")}
         <label title="error bar of a force that is held, in mean forces; 0: held exactly">±
           <input class="uncertainty" type="number" min="0" step="0.05" value="0" aria-label="error bar in mean forces"></label>
@@ -67,7 +69,6 @@ const BUTTONS = `
   <div class="game">Made: <span class="source"></span></div>
   <div class="skips" data-term="segment" tabindex="0"></div>
   </details><div class="message" role="status"></div></div>`
-const HALF_DIGIT = 5e-4 // of the last digit of a force
 const CLOSER = 0.7 // zoom factor of a button
 
 export class Buttons {
@@ -89,7 +90,7 @@ export class Buttons {
       ...actions, closer: zoom(CLOSER), farther: zoom(1 / CLOSER), whole: () => scene.reset(),
       full: () => (document.fullscreenElement ? document.exitFullscreen() : this.root.requestFullscreen()),
     }
-    for (const name of Object.keys(ICONS)) this.part(name)?.addEventListener("click", all[name])
+    for (const name of [...Object.keys(ICONS), "least", "largest"]) this.part(name)?.addEventListener("click", all[name])
     this.part("legend").addEventListener("change", ({ target }) => {
       const empty = target.type === "number" && target.value === ""
       const value = target.type === "checkbox" ? target.checked : empty ? null : target.type === "number" ? target.valueAsNumber : target.value
@@ -100,16 +101,8 @@ export class Buttons {
     extras.addEventListener("toggle", () => open("check", extras.open))
     const force = this.part("force")
     force.addEventListener("input", () => { this.typed = true })
-    force.addEventListener("change", () => {
-      this.typed = !force.validity.valid // stays to be corrected
-      actions.pull()
-    })
-    // A refused force stays to be corrected only as long as the focus does.
-    this.part("hold-tools").addEventListener("focusout", ({ currentTarget, relatedTarget }) => {
-      if (currentTarget.contains(relatedTarget)) return
-      this.typed = false
-      this.writeForce()
-    })
+    force.addEventListener("change", () => { this.typed = false; actions.pull() })
+    force.addEventListener("blur", () => { this.typed = false; this.writeForce() })
     this.part("uncertainty").addEventListener("keydown", (event) => { if (event.key === "Enter") actions.hold() })
   }
 
@@ -128,25 +121,19 @@ export class Buttons {
     this.root.classList.toggle("chosen", Boolean(chosen))
     this.part("hold").classList.toggle("on", held)
     this.part("hold").querySelector("span").textContent = held ? "Release" : "Hold"
-    this.part("force").disabled = held
+    for (const name of ["force", "least", "largest"]) this.part(name).disabled = held
   }
 
-  /** Show the force of the selected contact and its bounds, unless another value is being typed. */
-  showForce(value, [low, high]) {
-    const field = this.part("force")
-    field.min = low - HALF_DIGIT
-    field.max = high + HALF_DIGIT
+  /** Show the force of the selected contact, unless another value is being typed. */
+  showForce(value) {
     this.present = value
     if (!this.typed) this.writeForce()
   }
 
   writeForce() { this.part("force").value = this.present?.toFixed(3) ?? "" }
 
-  /** The typed force of the selected contact; NaN if it is outside its bounds. */
-  get force() {
-    const field = this.part("force")
-    return field.validity.valid ? field.valueAsNumber : NaN
-  }
+  /** The typed force of the selected contact; NaN for invalid input. */
+  get force() { return this.part("force").valueAsNumber }
 
   tellPlaying(playing) {
     this.bar.showPlaying(playing)
@@ -208,7 +195,7 @@ export class Buttons {
       eta2: form(walk.eta2[passed], 3),
       eta3: form(0.15 * walk.eta3[passed], 3),
       upto: `${passed} of ${walk.number.length - 1}`,
-      residual: Number.isFinite(residual) ? residual.toExponential(0) : "–",
+      residual: residual === 0 ? "0" : Number.isFinite(residual) ? residual.toExponential(0) : "–",
     }
     for (const [name, text] of Object.entries(texts)) this.part(name).textContent = text
     this.root.classList.toggle("ran", passed > 1 && !replay.held)

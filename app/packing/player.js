@@ -212,7 +212,7 @@ class Player {
 
   tellForce() {
     const { selected } = this.scene
-    if (selected !== null) this.buttons.showForce(this.replay.mixed.normal[selected], this.look.boundsOf(selected))
+    if (selected !== null) this.buttons.showForce(this.replay.mixed.normal[selected])
   }
 
   /** Mark the selection, or another contact. */
@@ -357,10 +357,6 @@ class Player {
     if (this.grows || !this.scene.hand) return
     const known = this.pins.has(contact)
     if (!known && Number.isNaN(error)) return this.say(NO_ERROR, true)
-    if (!known && Number.isNaN(this.buttons.force)) {
-      this.buttons.part("force").focus()
-      return this.hand.refuse()
-    }
     this.tell(known ? { release: contact } : { hold: [contact, this.hand.wanted(contact) ?? mixed.normal[contact], error] })
   }
 

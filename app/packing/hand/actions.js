@@ -17,6 +17,8 @@ export function actions(player) {
     less: loaded(() => player.hand.nudge(-1)),
     more: loaded(() => player.hand.nudge(1)),
     hold: loaded((replay) => player.hold(replay)),
+    least: loaded(() => player.hand.pullToEnd(-1)),
+    largest: loaded(() => player.hand.pullToEnd(1)),
     pull: loaded(() => player.hand.pullTo(player.buttons.force)),
     undo: loaded((replay) => { if (replay.held && !player.pushed.held) tell({ undo: true }) }),
     free: loaded(() => player.hand.free()),

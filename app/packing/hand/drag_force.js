@@ -18,6 +18,7 @@ const NUMBER_LINE = 14 // px, height of a line of numbers next to it
 const NUDGE = 1 / 40 // of a rail, per key press
 const REST = 600 // ms after the last key press until the force is released
 const ROUNDED = 1e-6 // in ⟨fₙ⟩, error of bounds in the page
+const HALF_DIGIT = 5e-4 // of the last digit of a typed force
 const FADE_MS = 1000 // ms for which its rail stays visible after release
 
 export class Grab {
@@ -127,23 +128,24 @@ export class Grab {
     this.resting = setTimeout(() => this.rest(), REST)
   }
 
-  /** Pull the selected contact to a value. */
+  /** Pull the selected contact to a value, or to the end of its interval that the value passes. */
   pullTo(value) {
     const { player } = this, { contact } = player.model
-    if (player.grows || this.active) return
-    if (Number.isNaN(value)) return this.refuse()
+    if (player.grows || this.active || Number.isNaN(value)) return
+    const [low, high] = player.look.boundsOf(contact)
+    this.aim = { contact, value: Math.max(low + ROUNDED, Math.min(high - ROUNDED, value)) } // rounded ends can lie outside
+    if (value <= low + HALF_DIGIT || value >= high - HALF_DIGIT) return this.pullToEnd(Math.sign(2 * value - low - high))
     if (player.playing) player.play(false)
     this.before = this.replay.mixed.normal.slice()
-    const [low, high] = player.look.boundsOf(contact) // of which `value` may have been rounded
-    this.aim = { contact, value: Math.max(low + ROUNDED, Math.min(high - ROUNDED, value)) }
     this.tell({ pull: [contact, this.aim.value] })
   }
 
-  /** The force of the selected contact, on screen or typed, is outside its bounds. */
-  refuse() {
-    const { model, look, replay } = this.player, [low, high] = look.boundsOf(model.contact).map((end) => end.toFixed(3))
-    const given = look.reduction ? " given the held forces" : ""
-    this.player.say(`Contact ${replay.walk.backbone[model.contact]} can bear ${low} to ${high} × the mean force${given}.`, true)
+  /** Pull the selected contact to its least (−1) or largest (1) value. */
+  pullToEnd(sign) {
+    this.grip = null
+    this.take(this.player.model.contact, ({ lower, upper }) => (sign > 0 ? upper : lower))
+    this.move()
+    this.leave()
   }
 
   /** The value to which a contact is being pulled, until its network arrives. */
@@ -204,12 +206,11 @@ export class Grab {
   takeRail(rail) {
     if (!rail) { this.contact = null; this.restoreMessage(); this.player.plots.move(false); return this.player.again() }
     if (rail.contact !== this.contact) return
-    const { mixed } = this.replay, more = this.rail !== null // the ends of a rail that was there in part
+    const more = this.rail !== null // the ends of a rail that was there in part
     this.rail = rail
     if (more) return this.arrived()
-    this.begun = mixed.normal[this.contact]
+    this.begun = this.replay.mixed.normal[this.contact]
     this.remember()
-    this.slid = mixed.tangential.map((t, c) => Math.abs(t) >= 0.999 * this.replay.walk.friction[c] * mixed.normal[c])
     this.arrived()
   }
 
@@ -267,28 +268,28 @@ export class Grab {
     return this.value >= upper - near ? 1 : this.value <= lower + near ? -1 : 0
   }
 
-  /** Contacts that opened or slide at the present end of the rail. */
+  /** Contacts that are open or slide at the present end of the rail, and did not before any pull. */
   get holding() {
-    const { rail, end, before, slid } = this, size = this.replay.walk.contacts
+    const { rail, end } = this, { frame, walk } = this.replay, size = walk.contacts
     const from = end > 0 ? size : 0
     const opened = [], sliding = []
     for (let c = 0; end && c < size; c++) {
-      if (rail.opened[from + c] && before[c] > CARRYING) opened.push(c)
-      if (rail.sliding[from + c] && !slid[c]) sliding.push(c)
+      const normal = walk.normal[frame * size + c], most = walk.friction[c] * normal
+      if (rail.opened[from + c] && normal > CARRYING) opened.push(c)
+      if (rail.sliding[from + c] && Math.abs(walk.tangential[frame * size + c]) < 0.999 * most) sliding.push(c)
     }
     return { opened, sliding }
   }
 
   describe(contact, value) {
-    const { walk } = this.replay, { rail, end } = this
-    const possible = rail ? ` (exact ${rail.lower.toFixed(3)} to ${rail.upper.toFixed(3)})` : ""
-    let words = `Contact ${walk.backbone[contact]} pulled to ${value.toFixed(3)}${possible} × the mean force`
-    if (rail && end) {
-      const { opened, sliding } = this.holding
-      words += `, its ${end > 0 ? "largest" : "smallest"} value: it stops because ${opened.length} contacts opened ` +
-        `and ${sliding.length} began to slide`
+    const { rail, end, replay: { walk } } = this, named = `Contact ${walk.backbone[contact]}`
+    if (!rail || !end) {
+      const possible = rail ? ` (exact ${rail.lower.toFixed(3)} to ${rail.upper.toFixed(3)})` : ""
+      return this.player.say(`${named} pulled to ${value.toFixed(3)}${possible} × the mean force`)
     }
-    this.player.say(words)
+    const { opened: { length }, sliding } = this.holding
+    this.player.say(`${named} pulled to its ${end > 0 ? "largest" : "least"} force, ${value.toFixed(3)}: ` +
+      `it stops because ${length} contact${length === 1 ? "" : "s"} opened and ${sliding.length} began to slide`)
   }
 
   // In the intervals

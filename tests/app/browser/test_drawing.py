@@ -369,31 +369,25 @@ def test_the_hover_box_follows_the_forces_and_stays_within_the_picture(run):
     assert inside and not left
 
 
-def test_a_refused_force_leaves_its_field_with_the_focus(run):
-    during, between, after = run(
+def test_the_field_of_a_force_shows_the_force_on_screen_once_a_value_was_entered(run):
+    typed, entered, pulls = run(
         "packing/buttons",
         """({ Buttons }) => {
-            const actions = { pull: () => {}, hold: () => {} }, root = document.createElement("div")
+            const pulls = [], root = document.createElement("div")
+            const actions = { pull: () => pulls.push(buttons.force), hold: () => {} }
             const buttons = new Buttons({ root }, actions, { look: () => {}, open: () => {} })
-            document.body.append(buttons.root)
-            const field = buttons.part("force"), shown = []
-            buttons.showForce(0.5, [0, 1])
-            field.focus()
+            const field = buttons.part("force")
+            buttons.showForce(0.5)
             field.value = 9
-            for (const name of ["input", "change"]) field.dispatchEvent(new Event(name))
-            const show = () => shown.push([field.value, Number.isNaN(buttons.force)])
-            buttons.showForce(0.6, [0, 1])
-            show()
-            buttons.part("hold").focus()
-            buttons.showForce(0.6, [0, 1])
-            show()
-            buttons.bar.playButton.focus()
-            show()
-            return shown
+            field.dispatchEvent(new Event("input"))
+            buttons.showForce(0.6)
+            const typed = field.value
+            field.dispatchEvent(new Event("change"))
+            buttons.showForce(0.7)
+            return [typed, field.value, pulls]
         }""",
     )
-    assert during == between == ["9", True]  # it cannot be held either
-    assert after == ["0.600", False]
+    assert (typed, entered, pulls) == ("9", "0.700", [9])
 
 
 def test_the_line_of_the_selected_contact_is_outlined_and_not_covered(run):
@@ -553,6 +547,35 @@ def test_a_force_in_the_hand_follows_its_rail_to_its_ends(run):
     assert (end["value"], end["normal"], end["end"]) == (4, [4, 0], 1)
     assert holding == {"opened": [1], "sliding": []}  # contact 0 slid before
     assert begun == pytest.approx(NORMAL[1, 0])  # where it was taken, it has the force it had
+
+
+@pytest.mark.parametrize("way", ["pullTo(9)", "pullToEnd(1)"], ids=["typed", "button"])
+def test_a_force_beyond_its_interval_is_pulled_to_the_end_with_the_reason(run, way):
+    """From there again, too: the reason compares with the network before any pull."""
+    said, words, again = run(
+        "packing/replay/replay packing/hand/drag_force",
+        f"""({{ Replay, Grab }}, {{ walk, rail }}) => {{
+            {HAND}
+            let words = ""
+            const pushed = {{ leave() {{}} }}, say = (line) => {{ words = line }}
+            Object.assign(player, {{ say, live: {{}}, playback: {{}}, pushed }})
+            Object.assign(player.look, {{ boundsOf: () => [rail.lower, rail.upper] }})
+            Object.assign(player.scene, {{ closeTip() {{}} }})
+            player.model.contact = 0
+            hand.{way}
+            hand.receive({{ rail: {{ ...rail, contact: 0, whole: true }} }})
+            const first = words
+            player.replay.mix()
+            hand.{way}
+            hand.receive({{ rail: {{ ...rail, contact: 0, whole: true }} }})
+            return [said, first, words]
+        }}""",
+        walk=WALK,
+        rail=RAIL,
+    )
+    assert said == [{"grab": 0}, {"pull": [0, 4]}, {"grab": 0}]  # it is there already
+    assert words == again
+    assert "largest force, 4.000: it stops because 1 contact opened and 0 began" in words
 
 
 @pytest.mark.parametrize(
