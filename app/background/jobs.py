@@ -288,10 +288,8 @@ class Job:
         left = self._expected - time.perf_counter()
         return left if self._left is None and 0 < left < math.inf else self._left
 
-    def tell(
-        self, done: float, total: float | None, *, part: tuple[float, float] = (0.0, 1.0)
-    ) -> None:
-        """Progress of the stage; part: begin and end of the stage on the whole bar.
+    def tell(self, done: float, total: float | None) -> None:
+        """Progress of the stage.
 
         Within a stage the bar never goes back, even if the total grows. Without a total, the bar
         stays where it is and nothing is estimated.
@@ -299,9 +297,7 @@ class Job:
         if total is None:
             self._left = None
             return
-        begin, end = part
-        reached = begin + (end - begin) * min(1.0, done / total)
-        self.fraction = max(reached, self.fraction or 0.0)
+        self.fraction = max(min(1.0, done / total), self.fraction or 0.0)
         now = time.perf_counter()
         if self._counted is None:
             self._counted = now, done

@@ -29,9 +29,9 @@ FIRST_STAGES = {
     "walk": "finding the contacts that carry force",
     "uniform": "finding the middle of S, where the samples start",
 }
-# The share of a compaction in the progress bar, and the part of its expected steps, those of
-# another packing, up to which their number can be relied on.
-PACKING_SHARE, NEARLY = 0.5, 0.95
+# The part of a compaction's expected steps, those of another packing, up to which their number can
+# be relied on.
+NEARLY = 0.95
 
 
 def load_or_compute(
@@ -68,7 +68,7 @@ def states(library: Library, selection: Selection) -> Work:
                         library.writable_cache,
                         kind,
                         params,
-                        progress=lambda done, total: _counted(job, done, total),
+                        progress=partial(_counted, job),
                         **_watched(job, selection, params),
                     )
                 cell = library.find(selection.kind, kind.parameters_of(params, dataset))
@@ -95,7 +95,7 @@ def all_states(library: Library, cell: Cell) -> Work:
 
 def computed_anew(library: Library, cell: Cell, params: Parameters, job: Job) -> xr.Dataset:
     """Compute the states of a cell again and store more of them, as given by these parameters."""
-    count = partial(_counted, job, begin=0.0)
+    count = partial(_counted, job)
     return load_or_compute(
         library, job, "reading the packing", SOURCES[cell.kind], params, progress=count
     )
@@ -224,7 +224,7 @@ def _compact(job: Job, library: Library, packing: Parameters) -> None:
 
     def tell(step: float, _: float | None) -> None:
         guessed = steps if steps and step < NEARLY * steps else None
-        job.tell(step, guessed, part=(0, PACKING_SHARE))
+        job.tell(step, guessed)
 
     job.begin("compressing")
     feed = progress_feed.shared(progress_feed.Compaction, packing)
@@ -237,6 +237,6 @@ def _compact(job: Job, library: Library, packing: Parameters) -> None:
     study.get(library.writable_cache, kinds.PACKING, packing, progress=tell, watch=look)
 
 
-def _counted(job: Job, done: float, total: float | None, begin: float = PACKING_SHARE) -> None:
+def _counted(job: Job, done: float, total: float | None) -> None:
     job.stage = f"{done} of {total} networks"
-    job.tell(done, total, part=(begin, 1))
+    job.tell(done, total)
