@@ -1,5 +1,6 @@
 """How long computations take on this machine: at first a guess, then as the last one of a kind."""
 
+import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,8 +11,9 @@ from ..background.jobs import Job
 
 USUAL_DISKS, USUAL_STATES = 400, 200
 # Seconds for USUAL_DISKS, with USUAL_STATES where states are drawn; replaced by those measured.
+# Other kinds are estimated by their progress alone.
 _seconds = {
-    "walk": 1.3, "uniform": 2.5, "intervals": 4.0, "informative": 12.0, "perturbation": 90.0,
+    "walk": 1.3, "uniform": 2.5, "intervals": 4.0, "perturbation": 90.0,
     "limit_loads": 4.0, "volume": 60.0, "outline": 2.0, "stress": 2.0,
 }  # fmt: skip
 # Kinds whose duration varies by factors between contacts (11 to 84 s): the longest so far counts.
@@ -20,7 +22,7 @@ _VARYING = ("perturbation",)
 
 def seconds(kind: str, params: Parameters) -> float:
     """The expected duration of a computation, s."""
-    return _seconds[kind] * _work(kind, params)
+    return _seconds.get(kind, math.inf) * _work(kind, params)
 
 
 @contextmanager
@@ -30,7 +32,8 @@ def expected(job: Job, stage: str, kind: str, params: Parameters) -> Iterator[No
     job.begin(stage, seconds(kind, params), longest=varies)
     yield
     took = (time.perf_counter() - begun) / _work(kind, params)
-    _seconds[kind] = max(took, _seconds[kind]) if varies else took
+    if kind in _seconds:
+        _seconds[kind] = max(took, _seconds[kind]) if varies else took
 
 
 def _work(kind: str, params: Parameters) -> float:

@@ -189,6 +189,11 @@ class Knowledge(param.Parameterized):
         self.work.message = ""
         self.ranking.start(ranking(state.library, state.cell, replay, known), self._rank)
 
+    def dismiss(self) -> None:
+        """Remove the contacts to measure next, found or being found."""
+        self.ranking.dismiss()
+        self.ranked = None
+
     def _rank(self, ranked: Ranked | None) -> None:
         if ranked is not None and ranked is not self.ranked:
             self.ranked = ranked if ranked.known == tuple(self.known) else None
@@ -373,7 +378,8 @@ def ranking(
         stage = "the best contacts to measure next, from uniform networks"
 
         def watch(found: Any) -> None:
-            job.so_far, job.stage = ranked(*found[:4]), "exact bounds of the best contacts"
+            job.begin("exact bounds of the best contacts")
+            job.so_far = ranked(*found[:4])
 
         informative = compute.load_or_compute(
             library, job, stage, kinds.INFORMATIVE, params, watch=watch

@@ -12,6 +12,8 @@ export function render({ model, view }) {
     <button type="button" class="soft next">Which force to measure next?</button><p class="meaning"></p><ol class="ranked"></ol>`
   const [chips, words, label, next, meaning, ranked] = root.children, select = label.lastElementChild
   const tell = (message) => ask(model, view, message)
+  const close = button("×", () => tell({ dismiss: true }), { className: "soft", title: "remove the list and its numbers in the packing" })
+  meaning.after(close)
 
   /** Mark a contact in the packing; null: the selected one. */
   const point = (contact) => view.model.document.get_model_by_name("player")?.player?.mark(contact)
@@ -36,7 +38,7 @@ export function render({ model, view }) {
     chips: () => chips.replaceChildren(...model.chips.map(chip)),
     words: () => { words.innerHTML = model.words },
     meaning: () => { meaning.textContent = model.meaning },
-    ranked: () => ranked.replaceChildren(...model.ranked.map(row)),
+    ranked: () => { ranked.replaceChildren(...model.ranked.map(row)); close.hidden = !model.ranked.length },
     asking: () => { next.disabled = model.asking },
     samplers: () => select.replaceChildren(...model.samplers.map(([value, textContent]) => createElement("option", { value, textContent }))),
     sampler: () => { select.value = model.sampler },

@@ -44,6 +44,7 @@ class Known(Scripted):
 
     _release = forward("_state.knowledge.release", release=int)
     _rank = forward("_state.knowledge.rank", next=True)
+    _dismiss = forward("_state.knowledge.dismiss", dismiss=True)
     _sample = forward("_state.sample_held", sample=True)
 
     @from_browser(choose=int)
