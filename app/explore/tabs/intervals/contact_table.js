@@ -114,8 +114,7 @@ export function render({ model, view }) {
     const column = Number(dataset.k)
     sorted.down = column === sorted.by ? !sorted.down : column > 1
     sorted.by = column
-    from = 0
-    fill()
+    turn(-from)
     part(`[data-k="${column}"]`).focus()
   })
   body.addEventListener("click", ({ target }) => { const row = target.closest("tr"); if (row) select(row) })
