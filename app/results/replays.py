@@ -49,6 +49,11 @@ class Replay(NamedTuple):
     sampling: measures.Sampling  # of the states shown
     summary: dict[str, Any]  # plain numbers of the states, by schema name
 
+    @property
+    def pressed(self) -> bool:
+        """Whether the pressure is prescribed, see Ensemble.has_pressure_row."""
+        return bool(np.isfinite(self.box).any() and not self.at_walls.any())
+
 
 def worded(replay: Replay, text: str) -> str:
     """A text about disks as packed, for what the replay shows: also bodies, and other origins."""

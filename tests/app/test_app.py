@@ -643,7 +643,7 @@ def test_the_sentence_of_the_intervals_says_what_is_drawn(state):
     state.compute_exact()
     assert "pale: exact, as bounds are found" in view.lead.object
     wait_for(state)
-    assert "every admissible network" in view.lead.object
+    assert "every network at this pressure" in view.lead.object
     state.choose(mu=0)
     wait_for(state)
     assert "Not at all" in view.lead.object and "dark" not in view.lead.object
@@ -653,15 +653,17 @@ def test_the_axis_holds_every_bar_and_names_the_order_that_there_is(state):
     state.looks.sort = "exact"
     view = View(state)
     label = view.drawing.figure.xaxis[0].axis_label
-    assert label.endswith("sorted by force as packed: no interval ΔFₙ, exact yet")
+    assert "sorted by force as packed: no interval ΔFₙ, exact yet; widest: contact " in label
     state.compute_exact()
     label = view.drawing.figure.xaxis[0].axis_label
-    assert label.endswith("sorted by force as packed: exact bounds are being computed")
+    assert "sorted by force as packed: exact bounds are being computed" in label
     wait_for(state)
     data, every = view.drawing.bars.data, len(state.replay.order)
-    assert (
-        view.drawing.figure.xaxis[0].axis_label
-        == f"{every} contacts, sorted by interval ΔFₙ, exact"
+    label = view.drawing.figure.xaxis[0].axis_label
+    widest, extent = data["contact"][-1], data["exact_high"][-1] - data["exact_low"][-1]
+    assert label == (
+        f"{every} contacts, sorted by interval ΔFₙ, exact; "
+        f"widest: contact {widest}, ΔFₙ {extent:.3f} (exact)"
     )
     assert np.all(np.diff(data["exact_high"] - data["exact_low"]) > -1e-6)
     assert view.drawing.figure.y_range.end > np.nanmax(data["exact_high"])

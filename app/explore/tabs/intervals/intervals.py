@@ -10,6 +10,7 @@ from ....background.notifications import observe
 from ....packing.legend import Bounds, exact_intervals
 from ....results.replays import Replay, worded
 from ....state.app_state import AppState
+from ....state.known import DETERMINED
 from ....state.view_settings import DRAWN, SCALES, SORTS
 from ....widgets.hints import term
 from ....widgets.parts import (
@@ -95,7 +96,7 @@ class View(TabView):
         self.drawing.dots.glyph.update(fill_color=now(looks.dark), line_color=now(looks.dark))
         self.drawing.mark(looks.contact)
         self.drawing.figure.xaxis.axis_label = worded(
-            replay, _across(len(replay.order), len(ranks), order.words)
+            replay, _across(len(replay.order), len(ranks), order.words) + _widest(replay, exact)
         )
         self.drawing.figure.yaxis.axis_label = worded(
             replay, f"normal force fₙ ({SCALES[looks.scale]})"
@@ -146,7 +147,8 @@ def sentence(
         if narrowed:
             words += "; faintest: without them"
         else:
-            words += " without the held forces" if held else ", every admissible network"
+            every = "network at this pressure" if replay.pressed else "admissible network"
+            words += " without the held forces" if held else f", every {every}"
         parts.append(mark(PALE, words))
     elif state.work.arriving is not None:
         parts.append(mark(PALE, "pale: exact, as bounds are found"))
@@ -191,3 +193,14 @@ def _exact_eta3(exact: Any) -> float | None:
 def _across(every: int, drawn: int, words: str) -> str:
     some = f"{every} contacts" if drawn == every else f"{drawn} of {every} contacts"
     return f"{some}, sorted by {words}"
+
+
+def _widest(replay: Replay, exact: Bounds) -> str:
+    """The contact with the longest interval, and its length; empty if all are determined."""
+    ends = exact or {"low": replay.low[:, 0], "high": replay.high[:, 0]}
+    extent = np.nan_to_num(ends["high"] - ends["low"], posinf=np.inf)
+    if not extent.max(initial=0.0) > DETERMINED:
+        return ""
+    longest = f"{extent.max():.3f}".replace("inf", "∞")
+    which = "exact" if exact else "seen"
+    return f"; widest: contact {replay.backbone[extent.argmax()]}, ΔFₙ {longest} ({which})"

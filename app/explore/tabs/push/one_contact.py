@@ -70,7 +70,7 @@ def table(replay: Replay, contact: int, pushed: Pushed) -> str:
     """Critical force, limit load, force as packed and decay exponent, as HTML."""
     cells = {
         F_CRIT: between(pushed.low, pushed.high) + " ⟨fₙ⟩",
-        LIMIT: f"{pushed.limit:.4g} ⟨fₙ⟩",
+        LIMIT + " (pressure prescribed)" * replay.pressed: f"{pushed.limit:.4g} ⟨fₙ⟩",
         term("fn", "fₙ as packed"): f"{replay.normal[0, contact]:.4g} ⟨fₙ⟩",
         term("alpha", "decay exponent α"): _alpha(pushed),
     }
