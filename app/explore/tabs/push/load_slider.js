@@ -51,6 +51,7 @@ export function render({ model, view }) {
     output.textContent = load.toFixed(2)
     part("b").textContent = note
     range.setAttribute("aria-valuetext", `${output.textContent} mean forces${note}`)
+    run.hidden = known() && !rising
     run.disabled = model.contact === null || rising > 0
     player()?.listeners.add(look)
     owner = player()?.pushed
