@@ -236,8 +236,12 @@ def at_friction(report: dict[str, Any], replay: Replay) -> dict[str, Any]:
 
 def report_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
     """The report as rows (name, value) of texts for the page."""
-    known = ((label, report[name], form, unit) for label, name, form, unit in _ROWS)
-    rows = [(label, f"{v:{form}}{unit}") for label, v, form, unit in known if v is not None]
+    known = ((*row, report[row[1]]) for row in _ROWS)
+    rows = [
+        (label, f"{v:{form if v else 'g'}}{unit}")
+        for label, _, form, unit, v in known
+        if v is not None
+    ]
     return rows + [("note", note) for note in report.get("notes", [])]
 
 

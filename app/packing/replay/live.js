@@ -109,7 +109,7 @@ export class Live {
     if (scene.size) scene.repaint()
     this.pictures++
     this.player.showRequested()
-    const unbalance = picture.unbalance > 0 ? `, unbalance ${picture.unbalance.toPrecision(1)} ⟨fₙ⟩` : ""
+    const unbalance = picture.unbalance > 0 ? `, unbalance ${Number(picture.unbalance.toPrecision(1))} ⟨fₙ⟩` : ""
     buttons.say(`Compressing ${picture.radius.length} disks at μ = ` +
       `${Number(picture.mu.toPrecision(4))}: packing fraction φ = ${picture.fraction.toFixed(4)}${unbalance}`)
   }
