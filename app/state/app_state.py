@@ -94,6 +94,7 @@ class AppState(param.Parameterized):
         }
         observe(self._need_loads, self, "replay", "looks.colour", "looks.thickness")
         self._linked: tuple[Selection, View] | None = None  # of a link to states in no store
+        self._stopped: list[tuple[Selection, int]] = []  # each with the networks asked for
         self._invalid: list[str] = []  # parameters of the last link that could not be read
         self._place: Place | None = None
         self.work.computation.param.watch(self._bring_back, ["dismissed", "message"])
@@ -260,8 +261,15 @@ class AppState(param.Parameterized):
             self.ask(self.given_held(self.cell.selection), at_once=True)
 
     def given_held(self, selection: Selection) -> Selection:
-        """A Selection with the held forces, if they are those of its packing."""
-        of_packing = self._shares_packing(selection)
+        """A Selection with the held forces, if they are those of its packing.
+
+        With as many networks as a stopped walk on screen it gets as many as were asked for there:
+        stopping one walk does not shorten others.
+        """
+        of_packing, on_screen = self._shares_packing(selection), self.cell and self.cell.selection
+        for stopped, states in self._stopped:
+            if stopped.states == selection.states and stopped in (self.selection, on_screen):
+                selection = selection._replace(states=states)
         return selection.holding(
             known.bounds(self.replay, self.knowledge.known) if of_packing else ()
         )
@@ -292,7 +300,7 @@ class AppState(param.Parameterized):
             self.comparison.keep(matching[0].selection)
             self.show(matching[0])
         elif mu is not None and self.cell is not None:
-            self.ask(self.cell.selection.at(mu))
+            self.ask(self.given_held(self.cell.selection.at(mu)))
 
     def cells(self) -> list[Cell]:
         """The cells of the series on screen, by μ."""
@@ -470,10 +478,12 @@ class AppState(param.Parameterized):
         self._keep_place()
         with as_one(self.work, self):
             self.shown = self.replay
-            self.work.compute(self.library, selection, self._computed)
+            self.work.compute(self.library, selection, partial(self._computed, selection.states))
 
-    def _computed(self, shown: Shown) -> None:
+    def _computed(self, states: int, shown: Shown) -> None:
         """Show states that were just computed, then their exact intervals if they are quick."""
+        if shown.cell.selection.states != states:
+            self._stopped.append((shown.cell.selection, states))
         self.refresh(shown)
         if shown.replay.normal.shape[1] <= EXACT_FOLLOW:
             self.compute_exact()

@@ -50,7 +50,7 @@ class Comparison(param.Parameterized):
             self.twin = None
             return
         try:
-            selection = state.cell.selection.at(looks.beside)
+            selection = state.given_held(state.cell.selection.at(looks.beside))
             selection.check(LIMITS)
         except InputError as error:
             looks.beside, state.work.message = None, str(error)

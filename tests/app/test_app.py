@@ -605,6 +605,26 @@ def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state
     np.testing.assert_array_equal(state.replay.normal[1], first)
 
 
+def test_a_walk_stopped_shortens_no_other_walk(state):
+    """Released, the stored free walk is shown at once; another sampler or μ is asked in full."""
+    free, task = state.cell, state.work.computation
+    contact = int(np.argmax(np.ptp(state.replay.normal, axis=0)))
+    state.knowledge.hold(contact, float(state.replay.normal[1:, contact].mean()))
+    wait_for(state)
+    state.sample_held()
+    task.job.stop()
+    wait_for(state)
+    assert state.cell.stored == state.selection.states == 1 and state.selection.held
+    controls = Controls(state)
+    assert controls.states.value == 1
+    controls.mu.mu = 0.23
+    assert state.selection.states == free.selection.states
+    task.dismiss()
+    assert state.selection.states == 1
+    state.knowledge.release(contact)
+    assert state.cell == free and not task.running and not state.missing
+
+
 def test_what_is_pale_says_of_which_friction_it_is(state):
     line = StatusLine(state)
     assert "nearest-network walk" in line.facts[-1] and "Still showing" not in line.facts[0]
