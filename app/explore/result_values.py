@@ -15,7 +15,7 @@ from granforce.measures.sampling import FEWEST, MIXED
 from ..results.library import Shown
 from ..results.progress_feed import Summary
 from ..results.replays import Replay, worded
-from ..results.selection import SOLVERS, Selection, differing
+from ..results.selection import KINDS, SOLVERS, Selection, differing
 from ..state.app_state import AppState
 from ..widgets.hints import term
 
@@ -104,14 +104,20 @@ def unbounded(summary: Summary) -> bool:
 
 def changes(now: Shown, was: Shown | None = None) -> str:
     """μ, η, z, φ and h as HTML; with earlier states what has changed, as "old → new"."""
+    shown = (now,) if was is None else (was, now)
+    # η₃ of S only if S is that of the networks, without held forces, and differs between the two:
+    # of the same packing only the networks have changed.
+    exact = all(one.exact is not None and not one.cell.selection.held for one in shown)
     if was is None:
-        return _listed(_compared(now, now.exact is not None))
+        return _listed(_compared(now, exact))
     new, old = now.cell.selection, was.cell.selection
-    # Of the same packing, exact bounds stay as they were: only the networks have changed.
-    exact = not (now.exact is None or was.exact is None or new.shares_packing(old))
+    if not new.is_comparable(old):
+        return f"Networks: {KINDS[old.kind]} → {KINDS[new.kind]}" * (new.kind != old.kind)
+    exact = exact and not new.shares_packing(old)
     before, after = _compared(was, exact), _compared(now, exact)
     values = {name: f"{before[name]} → {one}" for name, one in after.items() if before[name] != one}
-    words = "" if new.mu != old.mu or new.imported else f"{differing(new, old)}: "
+    old = old if new.mu == old.mu else old.at(new.mu)  # μ is among the values
+    words = "" if new.names(old) else f"{differing(new, old)}: "
     return words * bool(values) + _listed(values)
 
 

@@ -192,10 +192,11 @@ def _full(state: AppState, most: float) -> str:
 def _of_packing(state: AppState) -> str:
     """That the scale is of this packing; after a change of μ, the scale before it."""
     was = state.before
-    one = was is None or was.cell.mu == state.cell.mu
-    if one or state.growing or (was.exact is None) != (state.exact is None):
-        return ", this packing"
-    return f"; {_saturation(was.replay, was.exact):.2f} at μ = {was.cell.mu:g}"
+    if was is not None and not state.growing and (was.exact is None) == (state.exact is None):
+        new, old = state.cell.selection, was.cell.selection
+        if new.mu != old.mu and new.is_comparable(old):
+            return f"; {_saturation(was.replay, was.exact):.2f} at μ = {was.cell.mu:g}"
+    return ", this packing"
 
 
 def _largest(loads: Floats | None, full: float | None) -> str:

@@ -86,6 +86,10 @@ class Selection(NamedTuple):
         """Whether other is of the same packing and μ: all its contacts and exact bounds."""
         return (self.packing, self.mu) == (other.packing, other.mu)
 
+    def is_comparable(self, other: Selection) -> bool:
+        """Whether other is of the same packing, or both are of packings made here by compaction."""
+        return self.packing == other.packing or not (self.imported or other.imported)
+
     @property
     def conditions(self) -> Parameters:
         """Parameters of the S of its states, besides the packing."""
@@ -133,17 +137,14 @@ class Selection(NamedTuple):
 
 def differing(requested: Selection, shown: Selection | None) -> str:
     """The differences of a Selection from another one (None: everything), in words."""
-    if shown is None or requested.imported or shown.imported:
-        return (
-            f"the packing at μ = {requested.mu:g}"
-            if requested.imported
-            else f"μ = {requested.mu:g}"
-        )
+    at_mu = f"{'the packing at ' * requested.imported}μ = {requested.mu:g}"
+    if shown is None or not requested.is_comparable(shown):
+        return at_mu
     new, old, walks = requested.packing, shown.packing, requested.kind == "walk"
     parts = {
-        f"μ = {requested.mu:g}": requested.mu != shown.mu,
-        f"N = {new['n']}": new["n"] != old["n"],
-        f"seed {new['seed']}": new["seed"] != old["seed"],
+        at_mu: requested.mu != shown.mu,
+        f"N = {new.get('n')}": new.get("n") != old.get("n"),
+        f"seed {new.get('seed')}": new.get("seed") != old.get("seed"),
         f"packed at μ = {new['mu']:g}": not requested.same_mu and new["mu"] != old["mu"],
         "a random walk" if walks else f"networks {KINDS['uniform']}": requested.kind != shown.kind,
         f"{requested.states} networks": requested.states != shown.states,

@@ -13,7 +13,7 @@ from app.explore import result_values
 from app.explore.result_values import between, short, with_error
 from app.explore.results_line import results
 from app.packing import legend
-from app.results.library import Library
+from app.results.library import Library, Shown
 
 
 @pytest.fixture
@@ -88,6 +88,35 @@ def test_numbers_of_one_state_are_not_mixed_with_those_of_another(state):
     state.sample_held()
     wait_for(state)
     assert "older" not in results(state) and "seen given the held forces" in results(state)
+
+
+def test_results_before_a_release_are_those_of_the_networks_with_the_held_force(state):
+    state.compute_exact()
+    wait_for(state)
+    contact = int(np.argmax(np.ptp(state.replay.normal, axis=0)))
+    state.knowledge.hold(contact, float(state.replay.normal[1:, contact].mean()))
+    wait_for(state)
+    state.sample_held()
+    wait_for(state)
+    held = short(0.15 * state.replay.summary["eta3"])
+    state.ask(state.cell.selection._replace(held=(), states=7), at_once=True)
+    assert f"0.15 η₃ (seen) {held}" in results(state).partition("Before: ")[2]
+
+
+@pytest.mark.parametrize("kind", ["uniform", "walk"])
+def test_packings_that_have_nothing_in_common_are_not_compared(state, kind):
+    """Only another sampler is named; the colour scale is that of this packing alone."""
+    state.ask(state.cell.selection._replace(kind=kind), at_once=True)
+    wait_for(state)
+    state.open("?scene=slope")
+    wait_for(state)
+    assert state.before.cell.kind == kind and state.before.cell.mu != state.cell.mu
+    now = Shown(state.cell, state.replay, state.exact)
+    change = re.sub("<[^>]*>", "", result_values.changes(now, state.before))
+    state.looks.colour = "extent"
+    assert "at μ" not in legend.legend(state)
+    assert change == ("Networks: uniform in S → random walk" if kind == "uniform" else "")
+    assert change in results(state)
 
 
 def test_free_dimensions_are_derived(ready):
