@@ -142,11 +142,16 @@ class Player {
     else if (!shown) this.show(model.frame, false)
     else if (rests && !chosen) this.show(walk.begin, false)
     else this.show(place ?? (number === null || number > walk.states ? walk.begin : this.replay.positionOf(number)), false)
-    this.tellTab()
     this.playback.newest = walk.room > 0 || (this.playback.newest && place !== null && !rests)
-    if (!shown && !walk.room) this.playFirst()
-    else if (!rests && !this.pushes) requestAnimationFrame(() => this.play(true))
-    else this.play(false)
+    // After the server's `frame`, which arrives with the walk: one network for screen and address.
+    const { replay } = this
+    requestAnimationFrame(() => {
+      if (this.replay !== replay) return
+      if (chosen && !replay.swinging) this.show(place)
+      if (!shown && !walk.room) this.playFirst()
+      else this.play(!rests && !this.pushes)
+      this.tellTab()
+    })
   }
 
   /** Apply the colours of the theme. */
@@ -308,7 +313,7 @@ class Player {
     this.buttons.tellPlaying(playing)
     if (!replay) return
     if (playing) return this.say("")
-    model.frame = replay.frame
+    if (!this.pushed.held) model.frame = replay.frame // otherwise the server has the network of before
     this.paintPlots()
     this.mark()
   }

@@ -239,9 +239,6 @@ class AppState(param.Parameterized):
     def ask(self, selection: Selection, at_once: bool = False) -> None:
         """Select states: shown if a store has them, otherwise `missing`, or computed at_once."""
         self.comparison.keep(selection)
-        self._ask(selection, at_once)
-
-    def _ask(self, selection: Selection, at_once: bool) -> None:
         self.work.message = ""
         cell = cell_of(self.catalogue, selection)
         if cell is not None:

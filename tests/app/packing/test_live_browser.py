@@ -151,6 +151,27 @@ def test_computed_states_are_shown_to_the_last(visit, own_mu):
     expect(page.locator(".requested")).to_be_empty()
 
 
+def test_a_walk_that_ends_in_the_push_tab_leaves_one_network_on_screen_and_in_the_address(
+    visit, own_mu
+):
+    """With the push, the network as packed; after it, in another tab, that of before."""
+    page, walk = visit("?mu=0.1&n=30&network=8&paused=1"), "scene.hand.player.replay"
+    until(page, f"{walk}.frame > 0")
+    number = scene(page, f"{walk}.walk.number[{walk}.frame]")
+    how_it_is_made(page).get_by_label("Networks").first.fill("3000")
+    ask(page, own_mu)
+    until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 5")
+    page.get_by_role("tab", name="Push").click()
+    until(page, f"!scene.hand.player.grows && scene.geometry.mu === {own_mu}")
+    until(page, "scene.hand.player.pushed.held")
+    page.get_by_role("tab", name="Export").click()
+    until(page, "!scene.hand.player.pushed.held")
+    shown = scene(page, f"{walk}.walk.number[{walk}.frame]")
+    assert shown == number
+    page.wait_for_function(f"() => location.search.includes('network={shown}')")
+    assert scene(page, f"{walk}.frame === scene.hand.player.model.frame")
+
+
 # A message is of three frames: the one that says that the page has come is half a second late.
 LATE = """
 const {send} = WebSocket.prototype
