@@ -101,5 +101,5 @@ JOINT_GAP, LOADED_JOINT = 1e-6, 0.01
 LOCKED = 1e-6
 
 # Packings of more disks are large: sweeps update contacts in groups, the test of rest has fewer
-# draws, and the last phase of a compaction begins later and gives up earlier.
+# draws, and the last phase of a compaction gives up earlier.
 MANY_DISKS = 1000

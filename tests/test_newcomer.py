@@ -58,7 +58,7 @@ def test_help_shows_the_values_of_constants():
             assert not isinstance(value, numbers) or name == "Side", (name, word)
     told = pydoc.render_doc(gf.pack, renderer=pydoc.plaintext)
     assert f"farther than {compaction.STRIDE:g}." in told
-    assert f"by default {compaction.NEARLY_BALANCED:g}, less from {compaction.MANY_DISKS} d" in told
+    assert f"by default {compaction.NEARLY_BALANCED:g}, less from {compaction.LATER_FROM} d" in told
     assert "10⁻⁴" in told and compaction.NEARLY_FRICTIONLESS == 1e-4
     told = inspect.getdoc(gf.sample_uniform)
     assert f"up to {uniform.MOST_STATES} times" in told

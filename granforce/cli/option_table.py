@@ -262,7 +262,7 @@ OPTIONS = {
     ),
     "--drag-below": Option(
         "drag replaces inertia once no grain's momentum changes by more than this in a step, in "
-        "⟨f_n⟩ (default 0.02, less above 1000 disks; not used for μ ≤ 10⁻⁴)",
+        "⟨f_n⟩ (default 0.02, less above 2000 disks; not used for μ ≤ 10⁻⁴)",
         float,
     ),
     "--draw-seed": Option("seed for the random choice of contacts", int, 0),

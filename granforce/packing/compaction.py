@@ -48,10 +48,11 @@ from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 INITIAL_FRACTION = 0.5
 # The last phase is tried every CHECK_EVERY steps, once no grain's momentum changes by more than
-# NEARLY_BALANCED in a step, in ⟨f_n⟩; beyond MANY_DISKS, later by the square of their number, and
-# each time after twice as many steps, as the many places where grains still move need many systems.
+# NEARLY_BALANCED in a step, in ⟨f_n⟩; beyond LATER_FROM disks, later by the square of their number,
+# as the many places where grains still move need many systems, and beyond MANY_DISKS again only
+# after twice as many steps each time.
 CHECK_EVERY = 25
-NEARLY_BALANCED = 0.02
+NEARLY_BALANCED, LATER_FROM = 0.02, 2000
 # Longest time step, and most sweeps in it. From SETTLED_FROM on, steps of 0.1 leave wider intervals
 # than shorter ones, by 8 % at μ = 0.3, 13 % at 0.5, half at 1. Steps of 0.03 and less agree if the
 # last sweeps of a step settle, and then a quarter of the sweeps is enough.
@@ -156,7 +157,7 @@ def pack(
         to the fastest carrying grain.
     drag_below : float, optional
         Drag takes the place of inertia once no grain's momentum changes by more than this in a
-        step, in ⟨f_n⟩; by default 0.02, less from 1000 disks on. Only for μ above 10⁻⁴.
+        step, in ⟨f_n⟩; by default 0.02, less from 2000 disks on. Only for μ above 10⁻⁴.
     box : {"square", "isotropic", "floor", "smooth floor"}
         Sides and tilt of an isotropic box follow the stress until σ_xx = σ_yy = P0 and σ_xy = 0:
         jammed against shear too. On a floor, disks of weight π r² are poured one by one in a layer
@@ -220,7 +221,7 @@ def pack(
     settling = sweeps // SETTLING if mu >= SETTLED_FROM else 0
     pace = dynamics.Pace(box_mass, SHORTEST * dt, dt, STRIDE, int(sweeps), settling, accuracy)
     settings = {"dt": dt, "box_mass": box_mass, "sweeps": sweeps, "accuracy": accuracy}
-    slow = NEARLY_BALANCED * min(1.0, (MANY_DISKS / n) ** 2) if drag_below is None else drag_below
+    slow = NEARLY_BALANCED * min(1.0, (LATER_FROM / n) ** 2) if drag_below is None else drag_below
     counters = np.zeros(4, dtype=np.int64)
     work = dict.fromkeys(WORK, 0)
     look = None if watch is None else _looking(watch, unit, pressure, counters)
