@@ -352,15 +352,10 @@ def _update(order, force, velocity):
 
 @by_type
 def _rescale(problem, order, factor):
-    """Multiply the relaxation factor."""
+    """Multiply the relaxation factor of the contacts that are swept."""
     if _single(order):
         return lambda problem, order, factor: _scale(problem, factor)
-
-    def both(problem, order, factor):
-        _scale(problem, factor)
-        stiffen(order, factor)
-
-    return both
+    return lambda problem, order, factor: stiffen(order, factor)
 
 
 def _single(order):
