@@ -2,6 +2,7 @@
 
 import json
 import math
+import threading
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,10 +17,17 @@ from granforce.records import InputError
 DATA = Path(__file__).resolve().parents[2] / "data"
 Claim = dict[str, Any]
 
+_reading = threading.Lock()
 
-@cache
+
 def study() -> tables.StudyTable | None:
     """The reduced study, or None if it is not installed."""
+    with _reading:
+        return _study()
+
+
+@cache
+def _study() -> tables.StudyTable | None:
     try:
         return tables.load(DATA / "study.zarr")
     except InputError:
