@@ -83,9 +83,10 @@ def in_turn(job: Job, *named: Any) -> Iterator[None]:
     turn = turn_of(named)
     turn.join(job)
     if not turn.lock.acquire(timeout=_ASK):
-        _goes_as(job, turn.job)
+        job.follow(turn.job)
         raise Later
-    turn.job, job.stage = job, "starting"
+    turn.job = job
+    job.begin("starting")
     job.turns.append(turn)
     try:
         yield
@@ -93,15 +94,6 @@ def in_turn(job: Job, *named: Any) -> Iterator[None]:
         job.turns.remove(turn)
         turn.job = None
         turn.lock.release()
-
-
-def _goes_as(job: Job, other: Job | None) -> None:
-    """Copy the progress of the other job, which works for both."""
-    job.stage = "already under way"
-    if other is not None:
-        job.stage += f": {other.stage}"
-        job.fraction, job._left, job._longest = other.fraction, other.seconds_left, other._longest
-        job.so_far = other.so_far
 
 
 class Visitor(NamedTuple):
@@ -238,6 +230,7 @@ class Job:
         self.not_before = 0.0  # earliest time to run (again), as time.monotonic
         self._until = math.inf  # when it is ended
         self.fraction: float | None = None  # done, 0 … 1; None if unknown
+        self._entering = threading.Lock()  # so that nobody sees a stage with the bar of another
         self._left: float | None = None  # s of this stage, by its progress
         self._longest = False
         self._expected = math.inf  # its end, as time.perf_counter, before there is progress
@@ -272,15 +265,31 @@ class Job:
         about = "up to" if self._longest else "about"
         return self.doing + ("" if left is None else f" — {about} {_duration(left)} more")
 
+    @property
+    def progress(self) -> dict[str, Any]:
+        """Its fraction and words, of the same stage."""
+        with self._entering:
+            return {"fraction": self.fraction, "words": self.words}
+
     def begin(self, stage: str, expected: float = math.inf, longest: bool = False) -> None:
         """Enter a stage, whose bar and remaining time start anew.
 
         expected: its duration, s, to be said until its progress gives a better estimate; longest:
         whether most take less, so that it is a limit.
         """
-        self.stage, self._counted, self._longest = stage, None, longest
-        self.fraction = self._left = None
-        self._expected = time.perf_counter() + expected
+        with self._entering:
+            self.stage, self._counted, self._longest = stage, None, longest
+            self.fraction = self._left = None
+            self._expected = time.perf_counter() + expected
+
+    def follow(self, other: Job | None) -> None:
+        """Take the progress of the other job, which works for both."""
+        with self._entering:
+            self.stage = "already under way"
+            if other is not None:
+                self.stage += f": {other.stage}"
+                self.fraction, self._longest = other.fraction, other._longest
+                self._left, self.so_far = other.seconds_left, other.so_far
 
     @property
     def seconds_left(self) -> float | None:
@@ -452,7 +461,7 @@ class Task(param.Parameterized):
             self.param.update(running=False, words="", message="")
             return
         if not job.ended:
-            self.param.update(fraction=job.fraction, words=job.words)
+            self.param.update(**job.progress)
             return
         done, self.job, self._done = self._done, None, None
         # Announced together, so that the work is never over without its result.

@@ -736,18 +736,20 @@ def test_closing_the_page_ends_its_computation(state):
     assert job.wait(240) and job.result is None and job.error == ""
 
 
-def test_progress_grows_and_estimates_the_rest(state):
-    fractions = []
+def test_progress_grows_within_each_stage(state):
+    fractions = {}  # by stage, the first part of the words without its numbers
 
     def note(event):
-        if state.missing:  # of the states alone: exact intervals follow
-            fractions.append(event.new)
+        if event.new is not None:
+            stage = re.sub(r"\d+", "", state.work.computation.words.split(" — ")[0])
+            fractions.setdefault(stage, []).append(event.new)
 
     state.work.computation.param.watch(note, "fraction")
     state.ask(select(DISKS, 0.2, 2, states=100), at_once=True)
     wait_for(state)
-    known = [value for value in fractions if value is not None]
-    assert known and known == sorted(known) and all(0 <= value <= 1 for value in known)
+    assert fractions
+    for stage, known in fractions.items():
+        assert known == sorted(known) and 0 <= known[0] and known[-1] <= 1, stage
 
 
 def test_sizes_beyond_the_limits_are_refused(state):

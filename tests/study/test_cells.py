@@ -14,6 +14,7 @@ from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.keys import canonical
 from granforce.study.store import open_store
+from granforce.tolerances import MANY_DISKS
 
 
 def cell(packed_mu=0.3, seed=1, states=6, n=20, **options):
@@ -266,7 +267,10 @@ def test_public_names_are_what_they_say():
 
 
 def test_packings_of_different_algorithms_have_different_versions():
-    few, many = (kinds.PACKING.parameters(n, 0.1, 1)["version"] for n in (2000, 2001))
-    small, none = (kinds.PACKING.parameters(2001, mu, 1)["version"] for mu in (1e-4, 0))
-    assert len({few, many, small}) == 3
-    assert none == few  # the number of disks matters to overdamped motion alone
+    def versions(n):
+        return [kinds.PACKING.parameters(n, mu, 1)["version"] for mu in (0, 1e-4, 0.1)]
+
+    none, finished, few = versions(MANY_DISKS)
+    assert none == few != finished  # linear programs finish packings of small friction
+    large = set(versions(MANY_DISKS + 1))
+    assert len(large) == 1 and not large & {few, finished}
