@@ -1,4 +1,7 @@
-// Lines and circles on a canvas.
+// Lines, circles and letters on a canvas.
+
+/** A font of this size, such as "bold 12px", in the letters of the page. */
+export function font(size) { return `${size} ${getComputedStyle(document.body).fontFamily}` }
 
 /** Draw a straight line from a to b. */
 export function line(g, a, b) {

@@ -58,7 +58,7 @@ export const CHAPTERS = [
     name: "ladder", title: "A ladder", heading: "Which will it be?",
     text: ({ mu }) => `A ladder of weight 1 leans against a rough wall on a rough floor: friction is at most μ = ${mu} times the normal force (blue wedges). A mechanics course solves it without friction at the wall. With it, four forces are unknown, two at each end, and there are three equations of balance.`,
     ask: "The arrows show one solution. How large is the wall’s normal force?",
-    doing: () => "Drag the dot as far as it goes, to both sides, or drag an arrow. Wherever you stop, the ladder is in balance.",
+    doing: () => "Drag the dot to both ends, and past them, or drag an arrow. Wherever you stop in between, the ladder is in balance.",
     verdict: ({ low, high }, prediction) => ({
       answer: `Anything from ${two(low)} to ${two(high)}.`,
       so: prediction < low || prediction > high ? ", which is not among them" : ": possible, like all the others",
@@ -74,7 +74,7 @@ export const CHAPTERS = [
     name: "groove", title: "One disk in a groove", heading: "How hard does the wall press?",
     text: ({ mu }) => `A disk of weight 1 lies between two walls. Each wall exerts a normal force on it and a friction force along the wall, at most ${mu} times the normal force. Four unknown forces, three equations of balance: one number stays free.`,
     ask: "How large can the left wall’s normal force become?",
-    doing: () => "Drag the dot to the right as far as it goes, or drag an arrow. All forces stay in balance; a wedge turns grey where its contact is about to slip.",
+    doing: () => "Drag the dot to the right as far as it goes, and further, or drag an arrow. All forces stay in balance; a wedge turns grey where its contact is about to slip.",
     see: ({ low, high, mu }) => [
       `At ${two(high)} the disk would slip upwards if friction did not pull it down along both walls, and friction gives ${two(mu * high)} at most: ${mu} × ${two(high)}. At ${two(low)} friction holds the disk up. So each wall can press harder than the disk weighs.`,
       "Each point of the bar, S, is one set of forces that holds the disk. Which one is real depends on how the disk was pressed in and how it deforms, if only by a hair; we call disks rigid to leave both open. Now change the friction: at which μ is S one point, and from which μ on has it no end?",
@@ -138,14 +138,14 @@ export const CHAPTERS = [
   },
   {
     name: "friction", title: "Friction", heading: "Where are forces least determined?",
-    text: ({ all }) => `So far μ changed for the same disks. <b>Here each μ is a new packing</b> of ${all} disks. Its forces walk through S, all sets of forces that hold it. More friction lets forces lean further, but fewer contacts suffice: with three each, N disks have 3N/2 contacts: 3N unknown forces, 3N equations.`,
+    text: ({ all }) => `So far μ changed for the same disks. <b>Here each μ is a new packing</b> of ${all} disks, pressed together with this friction, and its forces walk through S, all sets of forces that hold it.`,
     ask: "At which friction μ do the forces vary most?",
     doing: () => "Drag the dot along the whole axis, to both ends. Blue: how much the forces vary. Grey: how many numbers are free.",
     see: ({ rows }) => {
       const most = rows.reduce((one, other) => (other.spread > one.spread ? other : one)), first = rows[0], last = rows.at(-1)
       return [
-        `At μ = ${first.mu}, ${first.free} numbers are free, but with little room each: forces vary by ${percent(first.spread)}. More friction gives more: ${percent(most.spread)} at μ = ${most.mu}, the most of these ${rows.length === 6 ? "six" : rows.length} packings.`,
-        `But contacts per disk fall from ${two(touching(first))} to ${two(touching(last))}: ${most.free} numbers are free at μ = ${most.mu}, ${last.free} at μ = ${last.mu}. S first grows wider and then loses its dimensions.`,
+        `With little friction many numbers are free, ${first.free} at μ = ${first.mu}, but each has little room: forces vary by ${percent(first.spread)}. More friction gives them room: ${percent(most.spread)} at μ = ${most.mu}, the most of these ${rows.length === 6 ? "six" : rows.length} packings.`,
+        `But with more friction a packing stands on fewer contacts, ${two(touching(last))} per disk instead of ${two(touching(first))}. With three per disk nothing would be free: 3N unknown forces, 3N equations. So S first grows wider and then loses its dimensions.`,
       ]
     },
     live: true,
@@ -162,12 +162,12 @@ export const CHAPTERS = [
     text: ({ mu }) => `The packing of chapter 5, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, step by step; all other forces give way just enough to balance the push.`,
     verdict: ({ limits: [first, ...others] }) => ({ answer: `It is ${two(first)}${others.length ? `; ${listed(others.map(two))} from other forces` : ""}.`, so: "" }),
     ask: "How hard can you push before a disk moves?",
-    doing: () => "Drag the dot to the right, or an arrow away from the marked line.",
+    doing: () => "Drag the dot to the right, or an arrow away from the marked line. Blue dots: about to slip.",
     see: ({ high, number, opened, slid, carried, moving, pushed, sinking, limit }) => [
       moving ? `Disks start to move (arrows): ${opened} contacts open (rings), ${slid} slip (dots). ${sinking ? "The upper disk, pushed up, sinks, but the lower one faster" : "The gap in the pair opens"}.`
-        : pushed ? `Without a push, the two disks press on each other with ${two(carried)}. At a push of ${two(high)}, disks start to move.`
+        : pushed ? `Without a push, the two disks press on each other with ${two(carried)}.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
-      `A contact that slips stays at its friction limit, and the others have to balance the rest. At ${two(high)} (end of the line) they no longer can: disks move.`,
+      ...(pushed ? [`A contact that slips stays at its friction limit, and the others have to balance the rest. At ${two(high)} (end of the line) they no longer can.`] : []),
       `Other forces in S (blue) would balance a push up to ${two(limit)}, the limit load, but sliding disks do not search for them. So a limit computed from statics alone can be too high: for a silo, a slope, a foundation.`,
     ],
     x: { low: 0, high: 2, label: "push (mean force = 1)" }, y: { low: 0, high: 1.5, label: "force of the line" },

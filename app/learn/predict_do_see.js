@@ -18,7 +18,7 @@ export class PredictDoSee {
   constructor(chapter, experiment, { plot, extra, knob, voice, row, foot, after, next }, { prediction, done }, { save, drawn, again }) {
     Object.assign(this, { chapter, experiment, host: plot, extra, knob, voice, row, foot, after, next, save, drawn, prediction, predicted: false, ready: true, announced: done })
     plot.classList.toggle("plane", Boolean(chapter.y))
-    this.plot = new QuantityPlot(plot, chapter, { marker: (value) => this.mark(value), dot: (x, y) => experiment.drag(x, y) })
+    this.plot = new QuantityPlot(plot, chapter, { marker: (value) => this.mark(value), dot: (x, y) => experiment.drag(x, y), release: () => experiment.release?.() })
     this.button = button("That is my prediction", () => this.begin(), { className: "primary" })
     this.again = button("Again", again)
     this.offer = button("", () => experiment.offer.run())
@@ -127,8 +127,8 @@ export class PredictDoSee {
       const words = stage === 0 ? PREDICT : this.ready ? chapter.doing(facts) : WAIT
       this.say(voice, [words], () => [createElement("p", { className: "todo", innerHTML: `<b>${STAGES[stage]}</b> ${words}` })])
     } else {
-      const sentences = chapter.see(facts)
-      this.say(voice, sentences, () => this.answer(sentences))
+      const sentences = chapter.see(facts), { headline = "" } = experiment
+      this.say(voice, [headline, ...sentences], () => this.answer(headline, sentences))
     }
     const [count, aside] = stage === 2 || (stage && chapter.live) ? [chapter.count?.(facts), experiment.aside] : []
     this.say(extra, [JSON.stringify([count, aside])], () => [count && sumOf(count), aside && looked(aside)].filter(Boolean))
@@ -142,12 +142,13 @@ export class PredictDoSee {
     element.replaceChildren(...parts())
   }
 
-  /** The answer next to the prediction, with its reason, the surprise and more. */
-  answer(sentences) {
+  /** The answer next to the prediction, or, once something else has been varied, what then holds; with its reason, the surprise and more. */
+  answer(headline, sentences) {
     const { chapter: { x, verdict: judged }, experiment, prediction } = this, off = this.named(experiment.answer) - this.named(prediction) // of the numbers shown
     const verdict = createElement("p", { className: "verdict" })
     const is = judged?.(experiment.facts, prediction) ?? { answer: `It is ${this.named(experiment.answer)}.`, so: x.log ? "" : Math.abs(off) < NEAR * (x.high - x.low) ? ": well done" : `, ${this.named(Math.abs(off))} too ${off > 0 ? "low" : "high"}` }
-    verdict.append(createElement("b", { textContent: is.answer }), createElement("span", { textContent: ` You predicted ${this.named(prediction)}${is.so}.` }))
+    const said = headline ? [headline, ` ${experiment.before}`] : [is.answer, ` You predicted ${this.named(prediction)}${is.so}.`]
+    verdict.append(...["b", "span"].map((tag, k) => createElement(tag, { textContent: said[k] })))
     return [verdict, ...sentences.map((innerHTML) => createElement("p", { innerHTML }))]
   }
 }
@@ -155,7 +156,7 @@ export class PredictDoSee {
 /** A plot that is only looked at. */
 function looked({ axes, ...state }) {
   const figure = createElement("figure", { className: "aside" })
-  new QuantityPlot(figure, axes, {}).draw(state)
+  new QuantityPlot(figure, axes, { release() {} }).draw(state)
   return figure
 }
 

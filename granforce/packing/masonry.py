@@ -35,7 +35,7 @@ def ladder(mu: float, angle: float = 60.0) -> Packing:
     foot, top = np.zeros(2), np.array([np.cos(slope), np.sin(slope)])
     across = 0.5 * _THIN * np.array([-top[1], top[0]])
     rod = np.array([foot, top / 2 - across, top, top / 2 + across])
-    floor = rectangle(-_THICK, -_THICK, top[0], 0)
+    floor = rectangle(-0.5, -_THICK, top[0], 0)  # room to slide
     wall = rectangle(top[0], 0, top[0] + _THICK, top[1] + _THICK)
     return assemblies.blocks(
         [rod, floor, wall], mu, fixed=[1, 2], weights=[1, 1, 1], balanced=False

@@ -1,13 +1,15 @@
 // The end of the lesson: the last network, with all predictions beside the answers, as a picture to keep.
 
-import { circle, line } from "../../browser/canvas_paths.js"
+import { circle, font, line } from "../../browser/canvas_paths.js"
 import { createElement, button } from "../../browser/dom.js"
 import { save } from "../../browser/download.js"
 import { Scale } from "./quantity_plot.js"
 
 const WIDE = 1200, HIGH = 630 // px, as links are previewed
-const RAIL = { left: 860, right: 1150, top: 190, step: 50 } // of the predictions
+const RAIL = { left: 850, right: 1040, top: 190, step: 50 } // of the predictions
 const TITLE = ["How far can forces go", "while nothing moves?"]
+
+const short = ({ log }, value) => (log ? String(Number(value.toPrecision(2))) : value.toFixed(2))
 
 export class ClosingPicture {
   constructor(host) {
@@ -18,7 +20,7 @@ export class ClosingPicture {
   /** scene: the packing on screen; chapters: [{title, x: axis, prediction, answer: [low, high]}]; look: as from palette. */
   draw(scene, chapters, look) {
     const g = this.canvas.getContext("2d"), { left, right, top, step } = RAIL, place = (x, value) => new Scale(x, left, right).px(Math.min(x.high, Math.max(x.low, value)))
-    const write = (text, x, y, colour, font) => { Object.assign(g, { fillStyle: colour, font: `${font} sans-serif` }); g.fillText(text, x, y) }
+    const write = (text, x, y, colour, size) => { Object.assign(g, { fillStyle: colour, font: font(size) }); g.fillText(text, x, y) }
     g.fillStyle = look.paper
     g.fillRect(0, 0, WIDE, HIGH)
     for (const { canvas } of [scene.disks, scene.chains, scene.marks]) g.drawImage(canvas, 0, 0, HIGH, HIGH)
@@ -28,6 +30,7 @@ export class ClosingPicture {
     chapters.forEach(({ title, x, prediction = null, answer }, k) => {
       const y = top + step * k
       write(title, HIGH + 40, y + 6, look.ink, "18px")
+      if (answer) write(`${prediction === null ? "" : `${short(x, prediction)} → `}${[...new Set(answer.map((v) => short(x, v)))].join(" to ")}`, right + 16, y + 5, look.ink, "16px")
       Object.assign(g, { strokeStyle: look.edge, lineWidth: 1.5 })
       line(g, [left, y], [right, y])
       if (answer) {
@@ -39,8 +42,9 @@ export class ClosingPicture {
       Object.assign(g, { strokeStyle: look.hand, lineWidth: 3 })
       g.stroke()
     })
-    write("granforce: forces in packings of disks", HIGH + 40, 602, look.weight, "16px")
-    const named = chapters.filter(({ prediction, answer }) => answer && prediction !== null).map(({ title, prediction, answer }) => `${title}: ${prediction.toPrecision(2)}, answer ${answer.map((v) => v.toPrecision(2)).join(" to ")}`)
+    const { host: server, hostname, pathname } = window.location
+    write(hostname === "localhost" ? "granforce: forces in packings of disks" : `${server}${pathname}?learn`, HIGH + 40, 602, look.weight, "16px")
+    const named = chapters.filter(({ prediction, answer }) => answer && prediction !== null).map(({ title, x, prediction, answer }) => `${title}: ${short(x, prediction)}, answer ${answer.map((v) => short(x, v)).join(" to ")}`)
     this.canvas.ariaLabel = `Your predictions. ${named.join("; ")}`
   }
 }

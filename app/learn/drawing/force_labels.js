@@ -1,5 +1,6 @@
 // Labels of the forces in a small scene: their values and, for a single disk, their names.
 
+import { font } from "../../browser/canvas_paths.js"
 import { distance } from "../model/polytope.js"
 import { number } from "../model/sentences.js"
 
@@ -10,11 +11,11 @@ export const ASIDE = 9 // px between friction and the wall that would cover it
 /** Values next to the forces used as axes of S, on the side of each with more room. */
 export function drawValues(arrows, F) {
   const { context: g, body, look } = arrows
-  g.font = "bold 12px sans-serif"
+  g.font = font("bold 12px")
   g.textAlign = "center"
   g.textBaseline = "middle"
   for (const [force, colour] of look.axes ?? []) {
-    const text = `${arrows.easel.high < SMALL ? "" : force % 2 ? "tangential " : "normal "}${number(F[force])}`, wide = g.measureText(text).width / 2 + 3
+    const text = `${arrows.easel.high < SMALL ? "" : force % 2 ? "tangential " : "normal "}${number(F[force], look.places)}`, wide = g.measureText(text).width / 2 + 3
     const ends = arrows.ends().filter(({ contact }) => contact === force >> 1), { at, across } = ends[0]
     const inward = ends.reduce((sum, end) => sum.map((v, k) => v + end.inward[k]), [0, 0]) // 0 between two disks
     const out = wide * Math.abs(across[0]) + 13, along = Math.max(0.3 * body.scene.r[ends[0].disk] * arrows.unit, wide + 4) // clear of a wall
@@ -34,9 +35,9 @@ export function drawValues(arrows, F) {
 /** Next to the only disk: the force of each wall, in numbers, and the weight. */
 export function drawNames(arrows, F) {
   const { context: g, body, look } = arrows, { scene } = body
-  g.font = "13px sans-serif"
+  g.font = font("13px")
   g.textBaseline = "middle"
-  const [cx, cy] = arrows.px(scene.x[0], scene.x[1])
+  const [cx, cy] = arrows.centre(0)
   const write = (x, y, lines, align) => {
     g.textAlign = align
     const middle = Math.min(y, arrows.easel.high - 8.5 * lines.length - 2) // in the picture
@@ -48,11 +49,11 @@ export function drawNames(arrows, F) {
   for (const { contact, at, inward, across } of arrows.ends()) {
     const [px, py] = arrows.px(...at), [n, t] = [F[2 * contact], F[2 * contact + 1]], [ux, uy] = [-inward[0], inward[1]]
     const along = [t * across[0], t * across[1]], way = Math.abs(t) < 5e-4 ? "" : Math.abs(along[1]) > Math.abs(along[0]) - 1e-9 ? `, ${along[1] > 0 ? "up" : "down"}` : along[0] > 0 ? ", right" : ", left"
-    const rubs = ["friction", `${number(Math.abs(t))}${way}`], x = px + 22 * ux, room = ux > 0 ? arrows.easel.wide - x : x
+    const rubs = ["friction", `${number(Math.abs(t), look.places)}${way}`], x = px + 22 * ux, room = ux > 0 ? arrows.easel.wide - x : x
     const fits = (line) => g.measureText(line).width < room - 4
     const both = fits(rubs.join(" ")) ? [rubs.join(" ")] : rubs
     const name = ["force from the ", ""].map((before) => scene.names[contact].replace("at the ", before)).find(fits) ?? ""
-    const pressed = ["normal force", "normal"].map((word) => `${word} ${number(n)}`).find(fits) ?? number(n)
+    const pressed = ["normal force", "normal"].map((word) => `${word} ${number(n, look.places)}`).find(fits) ?? number(n, look.places)
     const lines = look.unnamed ? [name] : [name, pressed, ...both]
     const foot = arrows.outline(0) && px < cx - NAMED ? "left" : undefined // away from the weight
     const side = Math.abs(ux) < 0.3 ? name.match(/(left|right) end/)?.[1] ?? foot : ux > 0 ? "right" : "left" // away from the other end

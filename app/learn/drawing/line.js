@@ -1,6 +1,6 @@
 // S as a line; and axes of forces, below S and next to it.
 
-import { line } from "../../browser/canvas_paths.js"
+import { font, line } from "../../browser/canvas_paths.js"
 import { forceName, number } from "../model/sentences.js"
 
 const TICKS = 70 // least pixels between two numbers of an axis
@@ -82,7 +82,7 @@ function nameAxis(space, words, colour, y) {
   g.save()
   g.translate(14, (high - space.floor) / 2)
   g.rotate(-Math.PI / 2)
-  g.font = "13px sans-serif"
+  g.font = font("13px")
   const short = g.measureText(words).width > high - space.floor ? words.replace(/\w+ force (on )?/, "") : words
   space.write(0, 0, short, colour, 13, "middle")
   g.restore()

@@ -48,7 +48,7 @@ export class Scale {
 }
 
 export class QuantityPlot {
-  /** axes: {x, y}, y null for a single quantity. hears: {marker(value), dot(x, y)}: called when dragged. */
+  /** axes: {x, y}, y null for a single quantity. hears: {marker(value), dot(x, y)}: called when dragged; {release()}: and when let go. */
   constructor(host, { x, y = null, second = null }, hears) {
     Object.assign(this, { host, axes: { x, y, second }, hears, allowed: null, state: {} })
     const svg = this.svg = element(host, "svg", { role: "group", "aria-label": x.label })
@@ -246,8 +246,12 @@ export class QuantityPlot {
       const [px, py] = at(event)
       this.move(px + held[0], py + held[1])
     })
-    for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { held = null })
+    for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => {
+      held = null
+      this.hears.release()
+    })
     svg.addEventListener("keydown", (event) => this.key(event))
+    svg.addEventListener("keyup", () => this.hears.release())
   }
 
   move(px, py) {

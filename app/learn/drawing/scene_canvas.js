@@ -5,7 +5,7 @@ import { shape } from "../model/contact_curves.js"
 import { distance, dot } from "../model/polytope.js"
 import { Easel } from "./layered_canvas.js"
 import { ASIDE, drawNames, drawValues } from "./force_labels.js"
-import { circle, inside, line, polygon, unflat } from "../../browser/canvas_paths.js"
+import { circle, font, inside, line, polygon, unflat } from "../../browser/canvas_paths.js"
 
 const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is room
 const LONG = 0.27 // of the picture: largest radius of a disk
@@ -80,8 +80,28 @@ export class Arrows {
     })
   }
 
+  /** A point of a body, where its pose has carried it. */
+  carried(disk, [x, y]) {
+    const [dx, dy, turn] = this.look?.poses?.[disk] ?? []
+    if (dx === undefined) return [x, y]
+    const { scene } = this.body, [a, b] = [x - scene.x[2 * disk], y - scene.x[2 * disk + 1]], [c, s] = [Math.cos(turn), Math.sin(turn)]
+    return [x - a + c * a - s * b + dx, y - b + s * a + c * b + dy]
+  }
+
+  /** The centre of a body on screen, in px. */
+  centre(disk) {
+    const { x } = this.body.scene
+    return this.px(...this.carried(disk, [x[2 * disk], x[2 * disk + 1]]))
+  }
+
   /** Both ends of every contact: {contact, disk, at, inward: force on the disk for f_n = 1, across}. */
   ends() {
+    const ends = this.touching()
+    return this.look?.poses ? ends.map((end) => ({ ...end, at: this.carried(end.disk, end.at) })) : ends
+  }
+
+  /** The same before any body has moved. */
+  touching() {
     const { scene } = this.body, disks = scene.r.length, ends = []
     if (this.endsOf === scene) return this.contactEnds
     Object.assign(this, { endsOf: scene, contactEnds: ends, places: [] })
@@ -107,7 +127,7 @@ export class Arrows {
     this.easel.measure()
     this.shafts = [] // of arrows, which numbers must avoid
     const wall = look.wall ?? []
-    this.easel.begin(look.paper, [body.scene, this.unit, this.x0, this.y0, look.disk, wall.join()], () => {
+    this.easel.begin(look.paper, [body.scene, this.unit, this.x0, this.y0, look.disk, wall.join(), look.poses?.join()], () => {
       this.drawWalls(wall)
       this.drawDisks()
     })
@@ -126,15 +146,13 @@ export class Arrows {
   /** more: a wall being drawn. */
   drawWalls(more) {
     const { context: g, body, look } = this, { box } = body.scene, walls = [...body.scene.walls, ...more]
-    g.strokeStyle = look.ink
     g.lineWidth = 3
     g.lineCap = g.lineJoin = "round"
-    g.beginPath()
     for (let k = 0; k < walls.length; k += 4) {
-      g.moveTo(...this.px(walls[k], walls[k + 1]))
-      g.lineTo(...this.px(walls[k + 2], walls[k + 3]))
+      const [dx, dy] = k / 4 === look.pushed?.wall ? look.pushed.by : [0, 0]
+      g.strokeStyle = dx || dy ? look.hand : look.ink
+      line(g, ...[0, 2].map((end) => this.px(walls[k + end] + dx, walls[k + end + 1] + dy)))
     }
-    g.stroke()
     if (!box[0]) return
     g.setLineDash([5, 5])
     g.lineWidth = 1
@@ -174,8 +192,8 @@ export class Arrows {
   }
 
   drawDisks() {
-    const { context: g, body, look } = this, { x, r } = body.scene, copies = this.copies()
-    const originals = Array.from(r, (_, disk) => ({ disk, at: this.px(x[2 * disk], x[2 * disk + 1]) }))
+    const { context: g, body, look } = this, { r } = body.scene, copies = this.copies()
+    const originals = Array.from(r, (_, disk) => ({ disk, at: this.centre(disk) }))
     for (const [k, { disk, at }] of [...originals, ...copies].entries()) {
       const outline = this.outline(disk)
       if (outline) polygon(g, outline.map((corner) => this.px(...corner)))
@@ -194,15 +212,15 @@ export class Arrows {
   }
 
   /** Corners of a body; null for a disk. */
-  outline(disk) { return unflat(this.body.scene.outlines[disk]) }
+  outline(disk) { return unflat(this.body.scene.outlines[disk])?.map((corner) => this.carried(disk, corner)) }
 
   /** Visible copies of the disks of a periodic scene. */
   copies() {
-    const { x, r, box } = this.body.scene, { wide, high } = this.easel, copies = []
+    const { r, box } = this.body.scene, { wide, high } = this.easel, copies = []
     if (!box[0]) return copies
     for (let disk = 0; disk < r.length; disk++) {
       for (const a of [-1, 0, 1]) for (const b of [-1, 0, 1]) {
-        const at = this.px(x[2 * disk] + a * box[0], x[2 * disk + 1] + b * box[1]), R = r[disk] * this.unit
+        const [px, py] = this.centre(disk), at = [px + a * box[0] * this.unit, py - b * box[1] * this.unit], R = r[disk] * this.unit
         if ((a || b) && at[0] > -R && at[1] > -R && at[0] < wide + R && at[1] < high + R) copies.push({ disk, at })
       }
     }
@@ -212,7 +230,7 @@ export class Arrows {
   beginNumbers() {
     const { context: g, look } = this
     g.fillStyle = look.ink
-    g.font = "12px sans-serif"
+    g.font = font("12px")
     g.textAlign = "center"
     g.textBaseline = "middle"
   }
@@ -235,7 +253,7 @@ export class Arrows {
 
   /** Position k of a disk's number: 0 its centre, otherwise around it. */
   numberAt(d, k) {
-    const { x, r } = this.body.scene, [px, py] = this.px(x[2 * d], x[2 * d + 1])
+    const { r } = this.body.scene, [px, py] = this.centre(d)
     const R = k && !this.outline(d) ? 0.72 * r[d] * this.unit : 0, angle = (k * Math.PI) / 6 + 3.4
     return [px + R * Math.cos(angle), py + R * Math.sin(angle)]
   }
@@ -307,10 +325,10 @@ export class Arrows {
 
   /** Weights, and loads added by the visitor. */
   drawLoads() {
-    const { body, look } = this, { x, r } = body.scene
+    const { body, look } = this, { r } = body.scene
     for (let d = 0; d < r.length; d++) {
       const load = [body.load[3 * d], body.load[3 * d + 1]]
-      if (Math.hypot(...load) > 1e-9) this.arrow(...this.px(x[2 * d], x[2 * d + 1]), load, look.weight, 2.5)
+      if (Math.hypot(...load) > 1e-9) this.arrow(...this.centre(d), load, look.weight, 2.5)
     }
     const long = (0.72 * Math.max(...r)) / this.forceUnit
     for (const { from, force } of this.pressing()) this.arrow(...this.px(...from), force.map((v) => v * long), look.weight, 2.5)

@@ -4,7 +4,7 @@
 import { distance, dot, solve } from "../model/polytope.js"
 import { Easel } from "./layered_canvas.js"
 import { axisForce, drawAxis, drawSegment, signOf } from "./line.js"
-import { circle, line, polygon, unflat } from "../../browser/canvas_paths.js"
+import { circle, font, line, polygon, unflat } from "../../browser/canvas_paths.js"
 import { drawName, readBy } from "./axis_readings.js"
 import { drawShadow } from "./shadow.js"
 import { drawSolid } from "./solid.js"
@@ -214,7 +214,7 @@ export class Space {
 
   write(x, y, text, colour, size = 13, align = "center") {
     const { context: g, easel } = this
-    g.font = `${size}px sans-serif`
+    g.font = font(`${size}px`)
     g.textAlign = align === "middle" ? "center" : align
     g.textBaseline = "middle"
     const words = text.split("\n"), wide = g.measureText(text).width

@@ -1,12 +1,13 @@
 // Chapters of small scenes: the bodies with their forces, and the explored part of S over one or two
 // forces.
 
-import { eased } from "../../browser/motion.js"
+import { STILL, eased } from "../../browser/motion.js"
 import { unflat } from "../../browser/canvas_paths.js"
 import { Arrows } from "../drawing/scene_canvas.js"
 import { fixed } from "../model/middle.js"
-import { area, dot, hull } from "../model/polytope.js"
+import { area, distance, dot, hull } from "../model/polytope.js"
 import { palette } from "../drawing/palette.js"
+import { givesWay, part, posed, slide } from "../model/give_way.js"
 import { SceneInHand } from "../model/scene_in_hand.js"
 import { stopping } from "../model/sentences.js"
 import { createElement } from "../../browser/dom.js"
@@ -15,6 +16,9 @@ const FOUND = 0.01 // relative distance from an end at which it counts as found
 const ROUND = 0.9 // part of S that a path round it has to enclose
 const ENDLESS = 100 // of the loads: how far an unbounded S is drawn, beyond all axes
 const STEPS = 20 // of a walk to other forces behind the same dot
+const GIVES = 0.3 // of the largest radius: most that bodies move at an end of S
+const SOFT = 3 // per weight: how fast they move when the hand goes past the end
+const FALL = 0.9, FRAMES = 60 // s, of bodies that no forces hold; poses in that time
 const FRICTION = { label: "friction μ", max: 1.2, step: 0.05, stage: 2 }
 
 export class SceneExperiment {
@@ -35,8 +39,8 @@ export class SceneExperiment {
     this.begun = this.body.u
     this.start = this.at
     this.mean = this.body.sumAt(this.body.u) / this.body.count
-    this.ends = this.body.whole ? this.end() : source.get("ends", this.options.scene).then(({ mu, bounds, outlines }) => {
-      this.known = mu.map((one, k) => ({ mu: one, bounds: bounds[k], outline: unflat([...outlines[k]]) ?? [] }))
+    this.ends = this.body.whole ? this.end() : source.get("ends", this.options.scene).then(({ mu, bounds, outlines, falls }) => {
+      this.known = mu.map((one, k) => ({ mu: one, bounds: bounds[k], outline: unflat([...outlines[k]]) ?? [], fall: falls[k] }))
       this.end()
     })
   }
@@ -53,7 +57,8 @@ export class SceneExperiment {
       const far = ENDLESS * body.scaleOf(), ends = body.corners.flatMap(({ u }) => [u, ...body.rays.map((ray) => u.map((v, d) => v + far * ray[d]))])
       return { bounds: body.empty ? [] : body.interval(x), outline: hull(ends.map((u) => this.flat(u))) }
     }
-    return body.empty ? { bounds: [], outline: [] } : known.find(({ mu }) => Math.abs(mu - body.mu) < 1e-9)
+    const S = known.find(({ mu }) => Math.abs(mu - body.mu) < 1e-9)
+    return body.empty ? { ...S, bounds: [], outline: [] } : S
   }
 
   end() {
@@ -70,24 +75,88 @@ export class SceneExperiment {
   /** Another friction: S is cut again, and explored anew. */
   turn(mu) {
     this.hand.cut(mu)
-    Object.assign(this, { way: [], others: this.others || null, varied: mu !== this.scene.mu })
+    Object.assign(this, { way: [], others: this.others || null, varied: mu !== this.scene.mu, past: null })
     this.end()
+    this.fall()
     this.changed()
   }
 
-  get turned() {
-    const { body, scene: { one }, S: { bounds: [low, high] = [] } = {} } = this, value = body.mu, mu = `μ = ${Number(value.toFixed(2))}`
-    if (low === undefined) return { value, words: `${mu}: S is empty, no forces can hold the ${one}${body.scene.r.length > 1 ? "s" : ""}.` }
-    if (high === Infinity) return { value, words: `${mu}: S has no end, forces can be as large as you like.` }
-    return { value, words: high - low < 1e-6 ? `${mu}: S is one point, ${low.toFixed(2)}. Nothing is left open.` : `${mu}: from ${low.toFixed(2)} to ${high.toFixed(2)}` }
+  get turned() { return { value: this.body.mu, words: this.friction } }
+
+  get friction() { return `μ = ${Number(this.body.mu.toFixed(2))}` }
+
+  /** The friction that the question was asked for, and its answer. */
+  get before() {
+    const { scene: { mu }, first: { bounds }, options: { goal } } = this
+    return `With μ = ${mu}, as asked: ${goal === "both" ? "from " : ""}${(goal === "both" ? bounds : [this.high]).map((v) => v.toFixed(2)).join(" to ")}.`
   }
+
+  /** S at another friction, in words. */
+  get headline() {
+    const { varied, bodies, S: { bounds: [low, high] = [] } = {} } = this, mu = this.friction
+    if (!varied) return ""
+    if (low === undefined) return `${mu}: nothing holds the ${bodies}, S is empty.`
+    if (high === Infinity) return `${mu}: S has no end.`
+    return high - low < 1e-6 ? `${mu}: S is one point, ${low.toFixed(2)}.` : `${mu}: from ${low.toFixed(2)} to ${high.toFixed(2)}.`
+  }
+
+  get bodies() { return `${this.scene.one}${this.scene.r.length > 1 ? "s" : ""}` }
 
   /** What is about to slip or to open where the dot is, at the edge of S, in words. */
   get edge() {
     const { body } = this, met = ({ slope, rest }) => Math.abs(dot(slope, body.u) + rest) < 1e-6 * body.scaleOf()
     if (this.locked || !body.whole || body.empty || body.corners.length < 2) return ""
     const stops = body.rows.filter(met).map(({ contact, what }) => [contact, what])
-    return stopping(body, { stops })
+    return `${stopping(body, { stops })}${this.past ? `: with ${this.past.sign > 0 ? "more" : "less"}, the ${this.bodies} would move` : ""}`
+  }
+
+  // Motion
+
+  /** How the bodies move if a normal force on the axes were to go past its interval, towards this value. */
+  push(index, value) {
+    const { body, scene } = this, [low, high] = body.whole && !body.empty ? body.interval(index) : [], sign = value > high ? 1 : value < low ? -1 : 0
+    if (!sign) return false
+    body.goToEnd(index, sign)
+    const motion = givesWay(body, index >> 1, sign), far = Math.abs(value - (sign > 0 ? high : low)) / body.scaleOf()
+    if (!motion) return false
+    const most = Math.max(...motion.flatMap(([x, y, turn], d) => [Math.hypot(x, y), Math.abs(turn) * scene.r[d]]))
+    this.past = { sign, contact: index >> 1, motion, size: (GIVES * Math.max(...scene.r) * (1 - Math.exp(-SOFT * far))) / most }
+    return true
+  }
+
+  /** Let go: bodies return. */
+  release() {
+    if (!this.past) return
+    this.past = null
+    this.changed()
+  }
+
+  /** If no forces hold the bodies any more, they give way; otherwise they are where they were. */
+  fall() {
+    const { body, arrows, slid } = this
+    const poses = () => (this.known ? this.loosened() : slide(body, arrows.touching()))
+    this.slid = body.empty ? slid ?? { poses: poses(), began: performance.now() } : null
+  }
+
+  /** Poses, one after the other, in the motion that proves that no forces hold the bodies. */
+  loosened() {
+    const { scene, S: { fall } } = this, most = GIVES * Math.max(...scene.r), motion = posed(scene, fall)
+    return Array.from({ length: FRAMES }, (_, k) => part(motion, (most * k) / (FRAMES - 1)))
+  }
+
+  /** Poses on screen, null where nothing has moved, and the wall that moves with a body. */
+  get motion() {
+    const { slid, past, scene, arrows } = this
+    if (slid) {
+      const share = STILL.matches ? 1 : Math.min(1, (performance.now() - slid.began) / 1000 / FALL)
+      return { poses: slid.poses[Math.round(share ** 2 * (slid.poses.length - 1))], moves: share < 1 }
+    }
+    this.pushed = past ?? this.pushed // whose motion runs back
+    const [gone] = this.gone = eased(this.gone ?? [0], [past?.size ?? 0]), moves = gone !== (past?.size ?? 0)
+    if (!gone) return { poses: null, moves }
+    const { contact, motion, sign } = this.pushed, [end] = arrows.touching().filter((one) => one.contact === contact)
+    const by = end.inward.map((v) => sign * gone * v)
+    return { poses: part(motion, gone), pushed: { wall: wallAt(scene, end.at), by }, moves }
   }
 
   // Forces
@@ -127,6 +196,8 @@ export class SceneExperiment {
     if (body.empty) return
     if (options.y !== null) body.steer([options.x, options.y], [x, y])
     body.steer([options.x], [x]) // at the edge of S the other force yields
+    this.past = null
+    if (!this.push(options.x, x) && options.y !== null) this.push(options.y, y)
     this.moved()
   }
 
@@ -177,8 +248,11 @@ export class SceneExperiment {
     if (this.locked) return what === "press"
     if (what === "pull") {
       this.body.pull(given.contact, given.normal, given.tangential)
+      this.past = null
+      this.push(2 * given.contact, given.normal)
       this.moved()
     }
+    if (what === "release") this.release()
     return false
   }
 
@@ -207,11 +281,17 @@ export class SceneExperiment {
     }
     body.u = this.shown = eased(this.shown, u)
     this.label.textContent = this.edge
-    const colours = palette(dark), axes = new Map(y === null ? [] : [[x, colours.across], [y, colours.up]])
-    arrows.draw({ ...colours, axes, contacts: this.lit, contact: null, disk: null, fall: null, unnamed: this.hidden })
+    const colours = palette(dark), axes = new Map(y === null ? [] : [[x, colours.across], [y, colours.up]]), { poses, pushed, moves } = this.motion
+    arrows.draw({ ...colours, axes, contacts: this.lit, contact: null, disk: null, fall: null, unnamed: this.hidden, places: 2, poses, pushed })
     body.u = u
-    return this.shown !== u
+    return this.shown !== u || moves
   }
 
   stop() {}
+}
+
+/** The number of the wall on which a point lies. */
+function wallAt({ walls }, [x, y]) {
+  const far = Array.from({ length: walls.length / 4 }, (_, k) => distance(walls.slice(4 * k, 4 * k + 2), walls.slice(4 * k + 2, 4 * k + 4), x, y))
+  return far.indexOf(Math.min(...far))
 }

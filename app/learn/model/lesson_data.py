@@ -42,18 +42,22 @@ def scene(name: str) -> dict[str, Any]:
 def ends(name: str, plane: tuple[int, int]) -> dict[str, Any]:
     """S of a small scene on two forces at every μ of FRICTIONS; empty lists where S is empty.
 
-    mu (k,); bounds: k times [least, largest] value of the first force; outlines: corners, flat.
+    mu (k,); bounds: k times [least, largest] value of the first force; outlines: corners, flat;
+    falls: the motion that proves that S is empty, as from `small_scenes.falling`.
     """
     packing = small_scenes.packing_of(name)
-    bounds, outlines = [], []
+    bounds, outlines, falls = [], [], []
     for mu in FRICTIONS:
+        rubbed = packing._replace(mu=mu)
         try:
-            S = small_scenes.measured(packing._replace(mu=mu), plane=plane)
+            S, fall = small_scenes.measured(rubbed, plane=plane), []
         except NotJammedError:
             S = {"bounds": [[]] * len(packing.contacts.i), "outline": []}
+            fall = small_scenes.falling(rubbed).tolist()
         bounds.append(S["bounds"][plane[0] // 2])
         outlines.append(S["outline"])
-    return {"mu": FRICTIONS, "bounds": bounds, "outlines": outlines}
+        falls.append(fall)
+    return {"mu": FRICTIONS, "bounds": bounds, "outlines": outlines, "falls": falls}
 
 
 class Packings:

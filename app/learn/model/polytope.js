@@ -355,6 +355,13 @@ export class Body {
     }
   }
 
+  /** Go to the corner where a force is least (sign −1) or largest (1), or, on a side of such corners, as near as possible. */
+  goToEnd(index, sign) {
+    const end = this.interval(index)[sign > 0 ? 1 : 0], corners = this.corners.filter(({ u }) => Math.abs(this.forces(u)[index] - end) < 1e-9 * this.scaleOf())
+    if (corners.length === 1) this.u = [...corners[0].u]
+    else this.steer([index], [end + sign * this.scaleOf()])
+  }
+
   /** A uniform draw by hit-and-run from u: a point of a random chord, along which these forces do not change. */
   step(u, random = Math.random, held = []) {
     const any = u.map(() => Math.sqrt(-2 * Math.log(1 - random())) * Math.cos(2 * Math.PI * random()))

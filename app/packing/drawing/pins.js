@@ -1,7 +1,7 @@
 // Marks of known forces: a pin on each held contact, hollow if it has an error bar; numbers on the
 // contacts most worth measuring, the best first; and arrows where a contact is pushed.
 
-import { arrow, circle } from "../../browser/canvas_paths.js"
+import { arrow, circle, font } from "../../browser/canvas_paths.js"
 import { markSelected } from "./marks.js"
 import { plain } from "../../browser/to_object.js"
 
@@ -111,7 +111,7 @@ export class Pins {
     context.lineWidth = 2
     context.strokeStyle = context.fillStyle = known
     context.stroke()
-    context.font = "bold 11px sans-serif"
+    context.font = font("bold 11px")
     context.textAlign = "center"
     context.textBaseline = "middle"
     context.fillText(number, x, y + 0.5)

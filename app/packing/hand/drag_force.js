@@ -3,7 +3,7 @@
 // release the force stays: the next pull starts there.
 
 import { CARRYING } from "../drawing/chain_style.js"
-import { circle, line } from "../../browser/canvas_paths.js"
+import { circle, font, line } from "../../browser/canvas_paths.js"
 import { plain } from "../../browser/to_object.js"
 import { PointHand } from "./drag_point.js"
 import { networkAt } from "../replay/replay.js"
@@ -360,7 +360,7 @@ export class Grab {
       }
       context.lineWidth = 2
       for (const end of [bottom, top, y]) line(context, [x - 7, end], [x + 7, end])
-      context.font = "12px sans-serif"
+      context.font = font("12px")
       context.textBaseline = "middle"
       const side = x > scene.size - 70 ? -1 : 1
       context.textAlign = side > 0 ? "left" : "right"

@@ -156,8 +156,8 @@ def test_a_walk_that_ends_in_the_push_tab_leaves_one_network_on_screen_and_in_th
 ):
     """With the push, the network as packed; after it, in another tab, that of before."""
     page, walk = visit("?mu=0.1&n=30&network=8&paused=1"), "scene.hand.player.replay"
-    until(page, f"{walk}.frame > 0")
-    number = scene(page, f"{walk}.walk.number[{walk}.frame]")
+    number = f"{walk}.walk.number[{walk}.frame]"
+    until(page, f"{number} === 8")
     how_it_is_made(page).get_by_label("Networks").first.fill("3000")
     ask(page, own_mu)
     until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 5")
@@ -166,9 +166,8 @@ def test_a_walk_that_ends_in_the_push_tab_leaves_one_network_on_screen_and_in_th
     until(page, "scene.hand.player.pushed.held")
     page.get_by_role("tab", name="Export").click()
     until(page, "!scene.hand.player.pushed.held")
-    shown = scene(page, f"{walk}.walk.number[{walk}.frame]")
-    assert shown == number
-    page.wait_for_function(f"() => location.search.includes('network={shown}')")
+    assert scene(page, number) == 8
+    page.wait_for_function(f"() => location.search.includes('network=8')")
     assert scene(page, f"{walk}.frame === scene.hand.player.model.frame")
 
 
