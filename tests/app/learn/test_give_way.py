@@ -70,7 +70,9 @@ def test_a_ladder_slides_along_floor_and_wall_until_it_lies(run):
         {"at": point.tolist(), "inward": (-normal).tolist()}
         for point, normal in zip(packing.contact_points, packing.contacts.normal, strict=True)
     ]
-    poses = np.array(run("learn/model/give_way learn/model/polytope", SLIDE, scene=scene, ends=ends))
+    poses = np.array(
+        run("learn/model/give_way learn/model/polytope", SLIDE, scene=scene, ends=ends)
+    )
     (x, y, turn), centre = poses[:, 0].T, packing.x[0]
     cos, sin = np.cos(turn), np.sin(turn)
     for end, normal, point in zip(

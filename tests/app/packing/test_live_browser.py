@@ -167,7 +167,7 @@ def test_a_walk_that_ends_in_the_push_tab_leaves_one_network_on_screen_and_in_th
     page.get_by_role("tab", name="Export").click()
     until(page, "!scene.hand.player.pushed.held")
     assert scene(page, number) == 8
-    page.wait_for_function(f"() => location.search.includes('network=8')")
+    page.wait_for_function("() => location.search.includes('network=8')")
     assert scene(page, f"{walk}.frame === scene.hand.player.model.frame")
 
 
