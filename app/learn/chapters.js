@@ -65,7 +65,7 @@ export const CHAPTERS = [
     }),
     see: ({ low, high, smooth }) => [
       `At ${two(low)} the wall’s friction holds the ladder up as hard as it can; at ${two(high)} it pulls it down. Textbooks make the wall smooth and keep the floor rough: only ${two(smooth)} is left. (The slider changes both.)`,
-      "A real ladder does take one of these values. Which one depends on how it bends and was set up, and a rigid body knows neither. So we ask: what is possible? <b>All sets of forces that hold it are called S</b>, here the blue bar.",
+      "A real ladder does take one of these values. Which one depends on how it bends and was set up, and a rigid body knows neither. So we ask: what is possible? <b>All sets of forces that hold it are called S</b>: the blue bar, if there is any.",
     ],
     x: { low: 0, high: 0.6, label: "normal force at the wall (weight of the ladder = 1)" }, y: null,
     experiment: SceneExperiment, options: { scene: "ladder", x: 2, y: null, goal: "both" },

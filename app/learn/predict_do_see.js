@@ -127,7 +127,7 @@ export class PredictDoSee {
       const words = stage === 0 ? PREDICT : this.ready ? chapter.doing(facts) : WAIT
       this.say(voice, [words], () => [createElement("p", { className: "todo", innerHTML: `<b>${STAGES[stage]}</b> ${words}` })])
     } else {
-      const sentences = chapter.see(facts), { headline = "" } = experiment
+      const { headline = "" } = experiment, sentences = chapter.see(facts).slice(headline ? -1 : 0) // the others are of the friction asked for
       this.say(voice, [headline, ...sentences], () => this.answer(headline, sentences))
     }
     const [count, aside] = stage === 2 || (stage && chapter.live) ? [chapter.count?.(facts), experiment.aside] : []
@@ -146,7 +146,7 @@ export class PredictDoSee {
   answer(headline, sentences) {
     const { chapter: { x, verdict: judged }, experiment, prediction } = this, off = this.named(experiment.answer) - this.named(prediction) // of the numbers shown
     const verdict = createElement("p", { className: "verdict" })
-    const is = judged?.(experiment.facts, prediction) ?? { answer: `It is ${this.named(experiment.answer)}.`, so: x.log ? "" : Math.abs(off) < NEAR * (x.high - x.low) ? ": well done" : `, ${this.named(Math.abs(off))} too ${off > 0 ? "low" : "high"}` }
+    const is = judged?.(experiment.facts, prediction) ?? { answer: `It is ${this.named(experiment.answer)}.`, so: x.log ? (this.named(prediction) === this.named(experiment.answer) ? ": well done" : `, too ${prediction < experiment.answer ? "low" : "high"}`) : Math.abs(off) < NEAR * (x.high - x.low) ? ": well done" : `, ${this.named(Math.abs(off))} too ${off > 0 ? "low" : "high"}` }
     const said = headline ? [headline, ` ${experiment.before}`] : [is.answer, ` You predicted ${this.named(prediction)}${is.so}.`]
     verdict.append(...["b", "span"].map((tag, k) => createElement(tag, { textContent: said[k] })))
     return [verdict, ...sentences.map((innerHTML) => createElement("p", { innerHTML }))]

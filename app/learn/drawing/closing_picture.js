@@ -6,7 +6,7 @@ import { save } from "../../browser/download.js"
 import { Scale } from "./quantity_plot.js"
 
 const WIDE = 1200, HIGH = 630 // px, as links are previewed
-const RAIL = { left: 850, right: 1040, top: 190, step: 50 } // of the predictions
+const RAIL = { left: 830, right: 1010, top: 190, step: 50 } // of the predictions
 const TITLE = ["How far can forces go", "while nothing moves?"]
 
 const short = ({ log }, value) => (log ? String(Number(value.toPrecision(2))) : value.toFixed(2))

@@ -134,7 +134,7 @@ export class Arrows {
     const F = body.empty ? null : body.forces()
     if (F) for (const end of this.ends()) this.drawEnd(end, F)
     if (look.fall) this.drawFall(look.fall)
-    this.drawLoads()
+    if (F || !look.poses) this.drawLoads() // none on what has fallen
     if (F) drawValues(this, F)
     if (body.scene.r.length > 1) this.drawNumbers()
     else if (F && body.count <= NAMED) drawNames(this, F)

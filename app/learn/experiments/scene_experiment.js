@@ -7,7 +7,7 @@ import { Arrows } from "../drawing/scene_canvas.js"
 import { fixed } from "../model/middle.js"
 import { area, distance, dot, hull } from "../model/polytope.js"
 import { palette } from "../drawing/palette.js"
-import { givesWay, part, posed, slide } from "../model/give_way.js"
+import { givesWay, part, slide } from "../model/give_way.js"
 import { SceneInHand } from "../model/scene_in_hand.js"
 import { stopping } from "../model/sentences.js"
 import { createElement } from "../../browser/dom.js"
@@ -16,9 +16,9 @@ const FOUND = 0.01 // relative distance from an end at which it counts as found
 const ROUND = 0.9 // part of S that a path round it has to enclose
 const ENDLESS = 100 // of the loads: how far an unbounded S is drawn, beyond all axes
 const STEPS = 20 // of a walk to other forces behind the same dot
-const GIVES = 0.3 // of the largest radius: most that bodies move at an end of S
+const GIVES = 0.2 // of the largest radius: most that bodies move at an end of S
 const SOFT = 3 // per weight: how fast they move when the hand goes past the end
-const FALL = 0.9, FRAMES = 60 // s, of bodies that no forces hold; poses in that time
+const FALL = 0.9 // s, of a body that no forces hold
 const FRICTION = { label: "friction μ", max: 1.2, step: 0.05, stage: 2 }
 
 export class SceneExperiment {
@@ -39,8 +39,8 @@ export class SceneExperiment {
     this.begun = this.body.u
     this.start = this.at
     this.mean = this.body.sumAt(this.body.u) / this.body.count
-    this.ends = this.body.whole ? this.end() : source.get("ends", this.options.scene).then(({ mu, bounds, outlines, falls }) => {
-      this.known = mu.map((one, k) => ({ mu: one, bounds: bounds[k], outline: unflat([...outlines[k]]) ?? [], fall: falls[k] }))
+    this.ends = this.body.whole ? this.end() : source.get("ends", this.options.scene).then(({ mu, bounds, outlines }) => {
+      this.known = mu.map((one, k) => ({ mu: one, bounds: bounds[k], outline: unflat([...outlines[k]]) ?? [] }))
       this.end()
     })
   }
@@ -57,8 +57,7 @@ export class SceneExperiment {
       const far = ENDLESS * body.scaleOf(), ends = body.corners.flatMap(({ u }) => [u, ...body.rays.map((ray) => u.map((v, d) => v + far * ray[d]))])
       return { bounds: body.empty ? [] : body.interval(x), outline: hull(ends.map((u) => this.flat(u))) }
     }
-    const S = known.find(({ mu }) => Math.abs(mu - body.mu) < 1e-9)
-    return body.empty ? { ...S, bounds: [], outline: [] } : S
+    return body.empty ? { bounds: [], outline: [] } : known.find(({ mu }) => Math.abs(mu - body.mu) < 1e-9)
   }
 
   end() {
@@ -93,10 +92,10 @@ export class SceneExperiment {
 
   /** S at another friction, in words. */
   get headline() {
-    const { varied, bodies, S: { bounds: [low, high] = [] } = {} } = this, mu = this.friction
+    const { varied, bodies, body, S: { bounds: [low, high] = [] } = {} } = this, mu = this.friction
     if (!varied) return ""
     if (low === undefined) return `${mu}: nothing holds the ${bodies}, S is empty.`
-    if (high === Infinity) return `${mu}: S has no end.`
+    if (!body.bounded) return `${mu}: S has no end.`
     return high - low < 1e-6 ? `${mu}: S is one point, ${low.toFixed(2)}.` : `${mu}: from ${low.toFixed(2)} to ${high.toFixed(2)}.`
   }
 
@@ -107,14 +106,16 @@ export class SceneExperiment {
     const { body } = this, met = ({ slope, rest }) => Math.abs(dot(slope, body.u) + rest) < 1e-6 * body.scaleOf()
     if (this.locked || !body.whole || body.empty || body.corners.length < 2) return ""
     const stops = body.rows.filter(met).map(({ contact, what }) => [contact, what])
-    return `${stopping(body, { stops })}${this.past ? `: with ${this.past.sign > 0 ? "more" : "less"}, the ${this.bodies} would move` : ""}`
+    return this.past ? `with ${this.past.sign > 0 ? "more" : "less"}, the ${this.bodies} would move` : stopping(body, { stops })
   }
 
   // Motion
 
-  /** How the bodies move if a normal force on the axes were to go past its interval, towards this value. */
+  /** How the bodies move if the normal force of a wall were to go past its interval, towards this value. */
   push(index, value) {
-    const { body, scene } = this, [low, high] = body.whole && !body.empty ? body.interval(index) : [], sign = value > high ? 1 : value < low ? -1 : 0
+    const { body, scene } = this
+    if (scene.j[index >> 1] < scene.r.length) return false // between two disks
+    const [low, high] = body.whole && !body.empty ? body.interval(index) : [], sign = value > high ? 1 : value < low ? -1 : 0
     if (!sign) return false
     body.goToEnd(index, sign)
     const motion = givesWay(body, index >> 1, sign), far = Math.abs(value - (sign > 0 ? high : low)) / body.scaleOf()
@@ -131,17 +132,10 @@ export class SceneExperiment {
     this.changed()
   }
 
-  /** If no forces hold the bodies any more, they give way; otherwise they are where they were. */
+  /** If no forces hold a single body at two walls any more, it slides down; otherwise it is where it was. */
   fall() {
-    const { body, arrows, slid } = this
-    const poses = () => (this.known ? this.loosened() : slide(body, arrows.touching()))
-    this.slid = body.empty ? slid ?? { poses: poses(), began: performance.now() } : null
-  }
-
-  /** Poses, one after the other, in the motion that proves that no forces hold the bodies. */
-  loosened() {
-    const { scene, S: { fall } } = this, most = GIVES * Math.max(...scene.r), motion = posed(scene, fall)
-    return Array.from({ length: FRAMES }, (_, k) => part(motion, (most * k) / (FRAMES - 1)))
+    const { body, arrows, slid, scene } = this, falls = body.empty && scene.r.length === 1 && body.count === 2
+    this.slid = falls ? slid ?? { poses: slide(body, arrows.touching()), began: performance.now() } : null
   }
 
   /** Poses on screen, null where nothing has moved, and the wall that moves with a body. */

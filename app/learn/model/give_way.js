@@ -9,7 +9,7 @@ const STEPS = 200, TURN = 0.01 // of a slide: most steps, and the turn of each
 const FLAT = 0.1 // angle with the floor at which a slide ends
 
 /** A pose for every body, from a motion [v_x, v_y, spin × r] for each. */
-export const posed = ({ r }, motion) => Array.from(r, (size, d) => [motion[3 * d], motion[3 * d + 1], motion[3 * d + 2] / size])
+const posed = ({ r }, motion) => Array.from(r, (size, d) => [motion[3 * d], motion[3 * d + 1], motion[3 * d + 2] / size])
 
 /**
  * The motion at an end of the interval of a normal force, sign 1 or −1: the wall moves by 1 towards or away from the

@@ -42,22 +42,18 @@ def scene(name: str) -> dict[str, Any]:
 def ends(name: str, plane: tuple[int, int]) -> dict[str, Any]:
     """S of a small scene on two forces at every μ of FRICTIONS; empty lists where S is empty.
 
-    mu (k,); bounds: k times [least, largest] value of the first force; outlines: corners, flat;
-    falls: the motion that proves that S is empty, as from `small_scenes.falling`.
+    mu (k,); bounds: k times [least, largest] value of the first force; outlines: corners, flat.
     """
     packing = small_scenes.packing_of(name)
-    bounds, outlines, falls = [], [], []
+    bounds, outlines = [], []
     for mu in FRICTIONS:
-        rubbed = packing._replace(mu=mu)
         try:
-            S, fall = small_scenes.measured(rubbed, plane=plane), []
+            S = small_scenes.measured(packing._replace(mu=mu), plane=plane)
         except NotJammedError:
             S = {"bounds": [[]] * len(packing.contacts.i), "outline": []}
-            fall = small_scenes.falling(rubbed).tolist()
         bounds.append(S["bounds"][plane[0] // 2])
         outlines.append(S["outline"])
-        falls.append(fall)
-    return {"mu": FRICTIONS, "bounds": bounds, "outlines": outlines, "falls": falls}
+    return {"mu": FRICTIONS, "bounds": bounds, "outlines": outlines}
 
 
 class Packings:
