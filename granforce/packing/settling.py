@@ -13,6 +13,7 @@
    motion resumes at 1.
 """
 
+from collections import Counter
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -40,6 +41,7 @@ from granforce.records import (
     with_friction,
 )
 from granforce.system import cancelling
+from granforce.system.compiled import wait_for_kernels
 from granforce.tolerances import CLOSED, MANY_DISKS, SAME_STATE, TOUCHING
 from granforce.types import Floats, Integers, Mask
 
@@ -102,6 +104,7 @@ def come_to_rest(
     counters to increase. look(motion, unbalance) is called repeatedly.
     """
     motion.velocity[:], motion.dilation[:] = 0.0, 0.0
+    wait_for_kernels(lambda: cancelling.check("compaction"))
     for _ in range(ATTEMPTS):
         motion, rested = _creep(motion, mu, work, look)
         if rested:
@@ -119,6 +122,17 @@ def come_to_rest(
         motion.force[:] = 0.0
         motion.force[listed] = certificate.forces
     return motion, packing, certificate
+
+
+def compile_kernels() -> None:
+    """Compile the kernels of this phase: a crystal comes to rest."""
+    count, r = 16, np.full(16, 0.5)
+    row, place = np.divmod(np.arange(count), 4)
+    x = np.column_stack([place + 0.5 * (row % 2), row * np.sqrt(0.75)])
+    box, none = np.array([4.0, 2 * np.sqrt(3)]), np.zeros(0, np.int64)
+    pairs = none, none, np.zeros((0, 2), np.int64), np.zeros((0, 2))
+    crystal = (x, np.zeros((count, 3)), r, np.pi * r**2, box, np.zeros(1), np.zeros(1))
+    come_to_rest(relisted(Motion(*crystal, *pairs, np.zeros(1), np.zeros(2))), 0.1, Counter())
 
 
 def slump(motion: Motion, mu: Mu, work: dict[str, Any], look: Look | None = None) -> Motion:

@@ -4,6 +4,7 @@ The location must be set before numba is imported.
 """
 
 import atexit
+import contextlib
 import functools
 import hashlib
 import os
@@ -80,6 +81,9 @@ def kernels() -> list[Path]:
     return found
 
 
+_ahead: list[subprocess.Popen[bytes]] = []  # processes that compile for this one
+
+
 def compile_ahead(statement: str, last: str) -> bool:
     """Run a statement that compiles kernels in a separate process if none are cached yet.
 
@@ -91,7 +95,17 @@ def compile_ahead(statement: str, last: str) -> bool:
     called = [sys.executable, "-c", f"import os; getattr(os, 'nice', int)(10); {statement}"]
     process = subprocess.Popen(called, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     atexit.register(process.terminate)
+    _ahead.append(process)
     return False
+
+
+def wait_for_kernels(check: Callable[[], object]) -> None:
+    """Wait for what `compile_ahead` has begun, to compile nothing twice; check() may raise."""
+    while _ahead:
+        check()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            _ahead[-1].wait(0.1)
+            _ahead.pop()
 
 
 def skip_unreadable_indices() -> None:

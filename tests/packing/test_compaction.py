@@ -8,6 +8,7 @@ from granforce.cell import Cell
 from granforce.forces.balance import stress_of
 from granforce.forces.build import ensemble
 from granforce.motion import contact_dynamics as dynamics
+from granforce.motion import flow, overdamped
 from granforce.motion.rest import rest
 from granforce.packing import settling
 from granforce.packing.closing import _stretch, margin, strained
@@ -432,3 +433,13 @@ def test_drag_can_begin_later():
     assert late.info["drag_below"] == 2e-4 and "drag_below" not in usual.info
     with pytest.raises(InputError, match=r"drag_below is not used at μ ≤ 0.0001"):
         pack(60, 1e-4, 5, drag_below=0.02)
+
+
+def test_kernels_compiled_ahead_are_those_of_every_packing():
+    def compiled():
+        return [kernel.signatures for kernel in (overdamped.move, flow.until_one_ends)]
+
+    pack(12, 0.5, 3)
+    before = compiled()
+    settling.compile_kernels()
+    assert compiled() == before and all(before)

@@ -5,6 +5,7 @@ import shutil
 import stat
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from numba.core.caching import IndexDataCacheFile
 
 import granforce
 from granforce.numerics import lanes
+from granforce.records import Cancelled
 from granforce.system import cancelling, compiled
 
 PACKAGE = Path(granforce.__file__).parent
@@ -122,3 +124,21 @@ def test_the_bar_of_a_call_says_that_kernels_are_compiled(capsys):
     listening = len(event._registered["numba:compile"])
     work(progress=True)
     assert len(event._registered["numba:compile"]) == listening
+
+
+def test_work_waits_for_kernels_that_another_process_compiles(tmp_path, monkeypatch):
+    """The process is seen to its end, unless the work is cancelled; then it ends nothing."""
+    monkeypatch.setattr(compiled, "are_cached", lambda last: False)
+    done = tmp_path / "done"
+    assert not compiled.compile_ahead(f"import time; time.sleep(1); open({str(done)!r}, 'w')", "x")
+    with pytest.raises(Cancelled):
+        compiled.wait_for_kernels(partial(_raise, Cancelled))
+    assert not done.exists()
+    asked = []
+    compiled.wait_for_kernels(lambda: asked.append(1))
+    assert done.exists() and asked
+    compiled.wait_for_kernels(partial(_raise, Cancelled))  # nothing is left
+
+
+def _raise(error):
+    raise error

@@ -26,6 +26,7 @@ from granforce.packing import exporters, importers, scenes
 from granforce.packing.importers.network import refuse_idle_reverse
 from granforce.packing.importers.snapshots import Snapshots
 from granforce.records import InputError, InputWarning, Packing, whole
+from granforce.system.compiled import compile_ahead
 from granforce.system.terminal import print_notes, print_report
 from granforce.system.wording import number
 
@@ -38,6 +39,10 @@ def pack(arguments: argparse.Namespace) -> None:
     max_steps = whole(arguments.max_steps, "--max-steps", 1)
     check_outputs(arguments.out)
     store = store_of(arguments)
+    # Beside this process, which needs other kernels first.
+    compile_ahead(
+        "from granforce.packing import settling; settling.compile_kernels()", "flow.until_one_ends"
+    )
     packing, cached = get_packing(store, parameters, max_steps=max_steps)
     reported = "steps", "sweeps_done", "largest_contact_gap", "least_other_gap", "distance_to_rest"
     work = {name: packing.info[name] for name in reported}
