@@ -63,8 +63,9 @@ def tell_when_compiling(
 
 def are_cached(last: str) -> bool:
     """Whether kernels are in the cache; last: the "module.kernel" that is compiled last."""
-    places = [os.environ.get("NUMBA_CACHE_DIR"), Path(__file__).parents[1], *_usual_places()]
-    return any(next(Path(place).rglob(f"{last}-*.nbi"), None) for place in places if place)
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    places = [Path(chosen)] if chosen else [Path(__file__).parents[1], *_usual_places()]
+    return any(next(place.rglob(f"{last}-*.nbi"), None) for place in places)
 
 
 def kernels() -> list[Path]:
