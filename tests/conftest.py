@@ -4,6 +4,9 @@ import os
 import subprocess
 import sys
 
+# Several workers share the cores: BLAS threads of each would wait for one another.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
 from hypothesis import settings
