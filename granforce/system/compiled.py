@@ -4,7 +4,6 @@ The location must be set before numba is imported.
 """
 
 import atexit
-import contextlib
 import functools
 import hashlib
 import os
@@ -12,6 +11,7 @@ import stat
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -94,7 +94,8 @@ def compile_ahead(statement: str, last: str) -> bool:
     if are_cached(last):
         return True
     called = [sys.executable, "-c", f"import os; getattr(os, 'nice', int)(10); {statement}"]
-    process = subprocess.Popen(called, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    nowhere = subprocess.DEVNULL  # an error is met again by the process that needs the kernel
+    process = subprocess.Popen(called, stdin=nowhere, stdout=nowhere, stderr=nowhere)
     atexit.register(process.terminate)
     _ahead.append(process)
     return False
@@ -102,11 +103,10 @@ def compile_ahead(statement: str, last: str) -> bool:
 
 def wait_for_kernels(check: Callable[[], object]) -> None:
     """Wait for what `compile_ahead` has begun, to compile nothing twice; check() may raise."""
-    while _ahead:
-        check()
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            _ahead[-1].wait(0.1)
-            _ahead.pop()
+    for process in _ahead:
+        while process.poll() is None:
+            check()
+            time.sleep(0.1)
 
 
 def skip_unreadable_indices() -> None:
