@@ -5,7 +5,12 @@ from urllib.parse import parse_qs
 
 import panel as pn
 
-from .browser.panel_patches import answer_with_lock, leave_links_alone, mend_late_views
+from .browser.panel_patches import (
+    answer_with_lock,
+    leave_links_alone,
+    mend_late_views,
+    search_for_present_links_only,
+)
 from .explore.explore_page import explore_page
 from .learn.learn_page import learn_page
 from .state import scene_links
@@ -19,6 +24,7 @@ def page() -> Any:
     mend_late_views(document)
     answer_with_lock()
     leave_links_alone()
+    search_for_present_links_only()
     query = (pn.state.location.search if pn.state.location else "") or ""
     request = scene_links.request_of(query)
     if learns(query) or request.scene not in scene_links.LARGE:

@@ -11,6 +11,7 @@ from bokeh.models import CustomJS
 from panel.io import document as panel_document
 from panel.io import location as panel_location
 from panel.io import unlocked
+from panel.links import Callback
 from panel.reactive import Syncable
 from panel.util import edit_readonly  # type: ignore[attr-defined]  # not exported by panel
 
@@ -78,6 +79,20 @@ def leave_links_alone() -> None:
     # Panel converts everything that looks like a number, and fails beyond 4300 digits: the page
     # would stay empty. Other values that it cannot parse go to the log at full length.
     vars(panel_location)["parse_query"] = lambda query: {}  # not exported by panel
+
+
+_process_links = Callback._process_callbacks
+
+
+def search_for_present_links_only() -> None:
+    """Keep Panel from searching the whole page for links at every change, where there are none."""
+
+    def process(*given: Any, **options: Any) -> None:
+        if any(Callback.registry.values()):
+            _process_links(*given, **options)
+
+    if Callback._process_callbacks == _process_links:
+        Callback._process_callbacks = process  # type: ignore[method-assign]
 
 
 def send_what_waits(document: Document) -> None:
