@@ -154,7 +154,7 @@ export const CHAPTERS = [
       [`free numbers, 2 × ${facts.contacts} − (3 × ${facts.disks} − 1)`, facts.free],
       ["forces vary by (typical deviation in the walk, mean force = 1)", percent(facts.spread)],
     ],
-    x: { low: 0.001, high: 10, log: true, label: "friction μ" }, y: { low: 0, high: 0.2, label: "forces vary by (mean force = 1)" }, second: { low: 0, high: 400, label: "free numbers" },
+    x: { low: 0.001, high: 10, log: true, label: "friction μ" }, y: { low: 0, high: 0.2, label: "forces vary by (mean force = 1)", follows: true }, second: { low: 0, high: 400, label: "free numbers" },
     experiment: Friction, options: {},
   },
   {
@@ -170,7 +170,7 @@ export const CHAPTERS = [
       ...(pushed ? [`A contact that slips stays at its friction limit, and the others have to balance the rest. At ${two(high)} (end of the line) they no longer can.`] : []),
       `Other forces in S (blue) would balance a push up to ${two(limit)}, the limit load, but sliding disks do not search for them. So a limit computed from statics alone can be too high: for a silo, a slope, a foundation.`,
     ],
-    x: { low: 0, high: 2, label: "push (mean force = 1)" }, y: { low: 0, high: 1.5, label: "force of the line" },
+    x: { low: 0, high: 2, label: "push (mean force = 1)" }, y: { low: 0, high: 1.5, label: "force of the line", follows: true },
     experiment: Push, options: {},
   },
 ]

@@ -14,7 +14,7 @@ function element(parent, tag, attributes = {}) {
   return child
 }
 
-/** One axis: {low, high, label, log, ticks, stops}, and its position in pixels. */
+/** One axis: {low, high, label, log, ticks, stops, follows: whether the other one sets its value}, and its position in pixels. */
 export class Scale {
   constructor(axis, from, to) { Object.assign(this, { axis, from, to }) }
 
@@ -218,7 +218,7 @@ export class QuantityPlot {
       group.setAttribute("tabindex", one === handle ? 0 : -1)
       group.classList.toggle("movable", one === handle)
     }
-    this.svg.style.touchAction = !handle ? "auto" : this.axes.y && handle === "dot" ? "none" : "pan-y"
+    this.svg.style.touchAction = !handle ? "auto" : this.axes.y && !this.axes.y.follows && handle === "dot" ? "none" : "pan-y"
   }
 
   // Dragging
