@@ -275,6 +275,7 @@ def test_the_same_disks_are_pushed_from_other_forces_and_every_limit_stays(openi
     other = page.get_by_role("button", name="Take other forces in S")
     expect(other).to_be_hidden()
     press(page, RIGHT)
+    expect(page.locator("figure.plot svg")).to_have_css("touch-action", "pan-y")
     page.get_by_text("Disks start to move").wait_for()
     page.get_by_text("the lower one faster").wait_for()
     assert page.locator("path.exact").get_attribute("d")  # S, once disks moved
