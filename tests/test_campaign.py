@@ -1,8 +1,8 @@
 """The random campaign: no wrong number, and nothing refused that has a network at hand.
 
 10 small cases, a fifth of their stages each, run always, 20 more with -m slow; 300 with all of them
-with -m stress. There a stage may say that it reached no certificate, rarely; it may never tell what
-is not so.
+with -m stress. There a stage may, rarely, say that it reached no certificate, but never state
+anything false.
 """
 
 import warnings

@@ -1,7 +1,9 @@
 // Lines, circles and letters on a canvas.
 
+let letters // of the page; read once, as it may trigger a layout
+
 /** A font of this size, such as "bold 12px", in the letters of the page. */
-export function font(size) { return `${size} ${getComputedStyle(document.body).fontFamily}` }
+export function font(size) { return `${size} ${letters ??= getComputedStyle(document.body).fontFamily}` }
 
 /** Draw a straight line from a to b. */
 export function line(g, a, b) {

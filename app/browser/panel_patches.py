@@ -84,15 +84,14 @@ def leave_links_alone() -> None:
 _process_links = Callback._process_callbacks
 
 
+def _process_present_links(*given: Any, **options: Any) -> None:
+    if any(Callback.registry.values()):
+        _process_links(*given, **options)
+
+
 def search_for_present_links_only() -> None:
     """Keep Panel from searching the whole page for links at every change, where there are none."""
-
-    def process(*given: Any, **options: Any) -> None:
-        if any(Callback.registry.values()):
-            _process_links(*given, **options)
-
-    if Callback._process_callbacks == _process_links:
-        Callback._process_callbacks = process  # type: ignore[method-assign]
+    Callback._process_callbacks = _process_present_links  # type: ignore[method-assign]
 
 
 def send_what_waits(document: Document) -> None:

@@ -3,7 +3,7 @@
 
 import { button, createElement } from "../browser/dom.js"
 import { STILL } from "../browser/motion.js"
-import { QuantityPlot } from "./drawing/quantity_plot.js"
+import { QuantityPlot, told } from "./drawing/quantity_plot.js"
 
 const PREDICT = "Drag the marker to your prediction.", WAIT = "Computing the networks … The first time on a server, this can take a minute."
 const STAGES = ["1 Predict", "2 Do"]
@@ -29,7 +29,7 @@ export class PredictDoSee {
   }
 
   /** A value of the quantity in question, in words. */
-  named(value) { return this.chapter.x.log ? `μ = ${Number(value.toPrecision(2))}` : value.toFixed(2) }
+  named(value) { return `${this.chapter.x.log ? "μ = " : ""}${told(this.chapter.x, value)}` }
 
   /** The slider of the experiment, with its name and a sentence about its value. */
   turnable() {
@@ -142,11 +142,18 @@ export class PredictDoSee {
     element.replaceChildren(...parts())
   }
 
+  /** How far the prediction is off, in the numbers shown; on a logarithmic axis, in which direction. */
+  get judged() {
+    const { chapter: { x }, experiment, prediction } = this, off = told(x, experiment.answer) - told(x, prediction)
+    if (x.log ? !off : Math.abs(off) < NEAR * (x.high - x.low)) return ": well done"
+    return `, ${x.log ? "" : `${told(x, Math.abs(off))} `}too ${off > 0 ? "low" : "high"}`
+  }
+
   /** The answer next to the prediction, or, once something else has been varied, what then holds; with its reason, the surprise and more. */
   answer(headline, sentences) {
-    const { chapter: { x, verdict: judged }, experiment, prediction } = this, off = this.named(experiment.answer) - this.named(prediction) // of the numbers shown
+    const { chapter: { verdict: judged }, experiment, prediction } = this
     const verdict = createElement("p", { className: "verdict" })
-    const is = judged?.(experiment.facts, prediction) ?? { answer: `It is ${this.named(experiment.answer)}.`, so: x.log ? (this.named(prediction) === this.named(experiment.answer) ? ": well done" : `, too ${prediction < experiment.answer ? "low" : "high"}`) : Math.abs(off) < NEAR * (x.high - x.low) ? ": well done" : `, ${this.named(Math.abs(off))} too ${off > 0 ? "low" : "high"}` }
+    const is = judged?.(experiment.facts, prediction) ?? { answer: `It is ${this.named(experiment.answer)}.`, so: this.judged }
     const said = headline ? [headline, ` ${experiment.before}`] : [is.answer, ` You predicted ${this.named(prediction)}${is.so}.`]
     verdict.append(...["b", "span"].map((tag, k) => createElement(tag, { textContent: said[k] })))
     return [verdict, ...sentences.map((innerHTML) => createElement("p", { innerHTML }))]
@@ -156,7 +163,7 @@ export class PredictDoSee {
 /** A plot that is only looked at. */
 function looked({ axes, ...state }) {
   const figure = createElement("figure", { className: "aside" })
-  new QuantityPlot(figure, axes, { release() {} }).draw(state)
+  new QuantityPlot(figure, axes, {}).draw(state)
   return figure
 }
 

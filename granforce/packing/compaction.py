@@ -23,7 +23,7 @@ from granforce.motion.rest import Rest, rest
 from granforce.numerics.lanes import MANY, ONE, allocating
 from granforce.packing import pair_list
 from granforce.packing.closing import margin, prescribed_of, shrink_to_isostatic
-from granforce.packing.pair_list import cell_of, relisted
+from granforce.packing.pair_list import cell_of, motionless, relisted
 from granforce.packing.pouring import poured
 from granforce.packing.settling import come_to_rest, same_state, slump
 from granforce.records import (
@@ -411,24 +411,8 @@ def _dilute_gas(r: Floats, rng: np.random.Generator, rates: int) -> dynamics.Mot
             break
         # Few or very unequal disks may not fit: start more dilute.
         fraction *= 0.9
-    n = len(r)
-    velocity = np.zeros((n, 3))
-    return relisted(
-        dynamics.Motion(
-            *(x, velocity, r, np.pi * r**2, np.full(2, side), np.zeros(1)),
-            np.zeros(1) if rates == 1 else np.zeros((1, rates)),
-            *(*_no_pairs(), np.zeros(1), np.zeros(2)),
-        )
-    )
-
-
-def _no_pairs() -> tuple[Integers, Integers, Integers, Floats]:
-    return (
-        np.zeros(0, np.int64),
-        np.zeros(0, np.int64),
-        np.zeros((0, 2), np.int64),
-        np.zeros((0, 2)),
-    )
+    dilation = np.zeros(1) if rates == 1 else np.zeros((1, rates))
+    return motionless(x, r, np.full(2, side), dilation)
 
 
 @allocating

@@ -20,6 +20,17 @@ def cell_of(motion: Motion) -> Cell:
     return Cell(motion.box, float(motion.tilt[0]))
 
 
+def motionless(x: Floats, r: Floats, box: Floats, dilation: Floats) -> Motion:
+    """Disks without velocities and forces, with their list of pairs."""
+    none, no_shift, no_force = np.zeros(0, np.int64), np.zeros((0, 2), np.int64), np.zeros((0, 2))
+    return relisted(
+        Motion(
+            *(x, np.zeros((len(r), 3)), r, np.pi * r**2, box, np.zeros(1), dilation),
+            *(none, none, no_shift, no_force, np.zeros(1), np.zeros(2)),
+        )
+    )
+
+
 def relisted(motion: Motion) -> Motion:
     """The motion with a new list of pairs, whose forces are carried over.
 

@@ -9,7 +9,7 @@ disk then rests on two places, but its weight alone, not those above it, is bala
 import numpy as np
 
 from granforce.motion.contact_dynamics import Motion
-from granforce.packing.pair_list import relisted
+from granforce.packing.pair_list import motionless
 from granforce.system import cancelling
 from granforce.types import Floats
 
@@ -37,14 +37,7 @@ def poured(r: Floats, rng: np.random.Generator) -> Motion:
         cancelling.check("compaction")
         x[k] = _hollow(x[:k], r[:k] + r[k], r[k], side, rng)
     both = np.append(r, STUD * r)
-    return relisted(
-        Motion(
-            *(behind_floor(x, both), np.zeros((2 * len(r), 3)), both, np.pi * both**2),
-            *(np.array([side, np.inf]), np.zeros(1), np.zeros((1, 0))),
-            *(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 2), np.int64)),
-            *(np.zeros((0, 2)), np.zeros(1), np.zeros(2)),
-        )
-    )
+    return motionless(behind_floor(x, both), both, np.array([side, np.inf]), np.zeros((1, 0)))
 
 
 def weights(motion: Motion) -> Floats:

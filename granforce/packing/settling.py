@@ -31,7 +31,7 @@ from granforce.numerics import contact_matrix
 from granforce.numerics.contact_matrix import Network
 from granforce.packing.closing import packing_of, prescribed_of, strained
 from granforce.packing.neighbours import separations
-from granforce.packing.pair_list import cell_of, relisted
+from granforce.packing.pair_list import cell_of, motionless, relisted
 from granforce.packing.pouring import behind_floor, weights
 from granforce.records import (
     NotJammedError,
@@ -126,13 +126,10 @@ def come_to_rest(
 
 def compile_kernels() -> None:
     """Compile the kernels of this phase: a crystal comes to rest."""
-    count, r = 16, np.full(16, 0.5)
-    row, place = np.divmod(np.arange(count), 4)
+    row, place = np.divmod(np.arange(16), 4)
     x = np.column_stack([place + 0.5 * (row % 2), row * np.sqrt(0.75)])
-    box, none = np.array([4.0, 2 * np.sqrt(3)]), np.zeros(0, np.int64)
-    pairs = none, none, np.zeros((0, 2), np.int64), np.zeros((0, 2))
-    crystal = (x, np.zeros((count, 3)), r, np.pi * r**2, box, np.zeros(1), np.zeros(1))
-    come_to_rest(relisted(Motion(*crystal, *pairs, np.zeros(1), np.zeros(2))), 0.1, Counter())
+    crystal = motionless(x, np.full(16, 0.5), np.array([4.0, 2 * np.sqrt(3)]), np.zeros(1))
+    come_to_rest(crystal, 0.1, Counter())
 
 
 def slump(motion: Motion, mu: Mu, work: dict[str, Any], look: Look | None = None) -> Motion:

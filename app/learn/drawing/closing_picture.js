@@ -3,13 +3,14 @@
 import { circle, font, line } from "../../browser/canvas_paths.js"
 import { createElement, button } from "../../browser/dom.js"
 import { save } from "../../browser/download.js"
-import { Scale } from "./quantity_plot.js"
+import { Scale, told } from "./quantity_plot.js"
 
 const WIDE = 1200, HIGH = 630 // px, as links are previewed
 const RAIL = { left: 830, right: 1010, top: 190, step: 50 } // of the predictions
 const TITLE = ["How far can forces go", "while nothing moves?"]
 
-const short = ({ log }, value) => (log ? String(Number(value.toPrecision(2))) : value.toFixed(2))
+/** The answer of a chapter in words: one value, or both ends. */
+const answered = ({ x, answer }) => [...new Set(answer.map((value) => told(x, value)))].join(" to ")
 
 export class ClosingPicture {
   constructor(host) {
@@ -27,10 +28,10 @@ export class ClosingPicture {
     TITLE.forEach((words, k) => write(words, HIGH + 40, 66 + 40 * k, look.ink, "bold 32px"))
     write("○ my prediction", HIGH + 40, 150, look.hand, "18px")
     write("● the answer", HIGH + 200, 150, look.cold, "18px")
-    chapters.forEach(({ title, x, prediction = null, answer }, k) => {
-      const y = top + step * k
+    chapters.forEach((chapter, k) => {
+      const { title, x, prediction = null, answer } = chapter, y = top + step * k
       write(title, HIGH + 40, y + 6, look.ink, "18px")
-      if (answer) write(`${prediction === null ? "" : `${short(x, prediction)} → `}${[...new Set(answer.map((v) => short(x, v)))].join(" to ")}`, right + 16, y + 5, look.ink, "16px")
+      if (answer) write(`${prediction === null ? "" : `${told(x, prediction)} → `}${answered(chapter)}`, right + 16, y + 5, look.ink, "16px")
       Object.assign(g, { strokeStyle: look.edge, lineWidth: 1.5 })
       line(g, [left, y], [right, y])
       if (answer) {
@@ -44,7 +45,7 @@ export class ClosingPicture {
     })
     const { host: server, hostname, pathname } = window.location
     write(hostname === "localhost" ? "granforce: forces in packings of disks" : `${server}${pathname}?learn`, HIGH + 40, 602, look.weight, "16px")
-    const named = chapters.filter(({ prediction, answer }) => answer && prediction !== null).map(({ title, x, prediction, answer }) => `${title}: ${short(x, prediction)}, answer ${answer.map((v) => short(x, v)).join(" to ")}`)
+    const named = chapters.filter(({ prediction, answer }) => answer && prediction !== null).map((chapter) => `${chapter.title}: ${told(chapter.x, chapter.prediction)}, answer ${answered(chapter)}`)
     this.canvas.ariaLabel = `Your predictions. ${named.join("; ")}`
   }
 }

@@ -246,12 +246,11 @@ export class QuantityPlot {
       const [px, py] = at(event)
       this.move(px + held[0], py + held[1])
     })
-    for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => {
+    for (const end of ["pointerup", "pointercancel", "keyup"]) svg.addEventListener(end, () => {
       held = null
-      this.hears.release()
+      this.hears.release?.()
     })
     svg.addEventListener("keydown", (event) => this.key(event))
-    svg.addEventListener("keyup", () => this.hears.release())
   }
 
   move(px, py) {
@@ -272,6 +271,9 @@ export class QuantityPlot {
     this.hears.dot(right ? this.x.step(x, right, event.shiftKey) : x, up ? this.y.step(y, up, event.shiftKey) : y)
   }
 }
+
+/** A value of the quantity on an axis, in words. */
+export const told = ({ log }, value) => (log ? String(Number(value.toPrecision(2))) : value.toFixed(2))
 
 /** A number on an axis. */
 const name = (value) => String(Number(value.toPrecision(3))).replace("-", "−")

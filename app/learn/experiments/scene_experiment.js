@@ -111,18 +111,20 @@ export class SceneExperiment {
 
   // Motion
 
-  /** How the bodies move if the normal force of a wall were to go past its interval, towards this value. */
-  push(index, value) {
-    const { body, scene } = this
-    if (scene.j[index >> 1] < scene.r.length) return false // between two disks
+  /**
+   * How the bodies move if the normal force of a wall were to go past its interval, towards this value: {sign, contact, motion, size};
+   * null if they do not. The force goes to the end of its interval.
+   */
+  beyond(index, value) {
+    const { body, scene } = this, contact = index >> 1
+    if (scene.j[contact] < scene.r.length) return null // between two disks
     const [low, high] = body.whole && !body.empty ? body.interval(index) : [], sign = value > high ? 1 : value < low ? -1 : 0
-    if (!sign) return false
+    if (!sign) return null
     body.goToEnd(index, sign)
-    const motion = givesWay(body, index >> 1, sign), far = Math.abs(value - (sign > 0 ? high : low)) / body.scaleOf()
-    if (!motion) return false
+    const motion = givesWay(body, contact, sign), far = Math.abs(value - (sign > 0 ? high : low)) / body.scaleOf()
+    if (!motion) return null
     const most = Math.max(...motion.flatMap(([x, y, turn], d) => [Math.hypot(x, y), Math.abs(turn) * scene.r[d]]))
-    this.past = { sign, contact: index >> 1, motion, size: (GIVES * Math.max(...scene.r) * (1 - Math.exp(-SOFT * far))) / most }
-    return true
+    return { sign, contact, motion, size: (GIVES * Math.max(...scene.r) * (1 - Math.exp(-SOFT * far))) / most }
   }
 
   /** Let go: bodies return. */
@@ -146,11 +148,10 @@ export class SceneExperiment {
       return { poses: slid.poses[Math.round(share ** 2 * (slid.poses.length - 1))], moves: share < 1 }
     }
     this.pushed = past ?? this.pushed // whose motion runs back
-    const [gone] = this.gone = eased(this.gone ?? [0], [past?.size ?? 0]), moves = gone !== (past?.size ?? 0)
+    const size = past?.size ?? 0, [gone] = this.gone = eased(this.gone ?? [0], [size]), moves = gone !== size
     if (!gone) return { poses: null, moves }
-    const { contact, motion, sign } = this.pushed, [end] = arrows.touching().filter((one) => one.contact === contact)
-    const by = end.inward.map((v) => sign * gone * v)
-    return { poses: part(motion, gone), pushed: { wall: wallAt(scene, end.at), by }, moves }
+    const { contact, motion, sign } = this.pushed, { at, inward } = arrows.touching().find((end) => end.contact === contact)
+    return { poses: part(motion, gone), pushed: { wall: wallAt(scene, at), by: inward.map((v) => sign * gone * v) }, moves }
   }
 
   // Forces
@@ -190,8 +191,7 @@ export class SceneExperiment {
     if (body.empty) return
     if (options.y !== null) body.steer([options.x, options.y], [x, y])
     body.steer([options.x], [x]) // at the edge of S the other force yields
-    this.past = null
-    if (!this.push(options.x, x) && options.y !== null) this.push(options.y, y)
+    this.past = this.beyond(options.x, x) ?? (options.y === null ? null : this.beyond(options.y, y))
     this.moved()
   }
 
@@ -242,8 +242,7 @@ export class SceneExperiment {
     if (this.locked) return what === "press"
     if (what === "pull") {
       this.body.pull(given.contact, given.normal, given.tangential)
-      this.past = null
-      this.push(2 * given.contact, given.normal)
+      this.past = this.beyond(2 * given.contact, given.normal)
       this.moved()
     }
     if (what === "release") this.release()

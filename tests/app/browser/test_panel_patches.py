@@ -7,7 +7,7 @@ from app.browser.panel_patches import search_for_present_links_only
 
 
 class Searched:
-    """A view and its model, of which a search is told."""
+    """A view, and its model, that cannot be searched."""
 
     def __init__(self):
         self.ref = {"id": "p1"}
