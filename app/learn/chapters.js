@@ -122,7 +122,7 @@ export const CHAPTERS = [
       PROGRAM,
     ],
     x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: null,
-    experiment: Grab, options: { across: 4, up: 0, axes: { x: { low: 1, high: 4, label: "box of chapter 3: normal force at the floor" }, y: { low: 0, high: 5, label: "between the disks" } } },
+    experiment: Grab, options: { marked: "grabbed", across: 4, up: 0, axes: { x: { low: 1, high: 4, label: "box of chapter 3: normal force at the floor" }, y: { low: 0, high: 5, label: "between the disks" } } },
   },
   {
     name: "chance", title: "A random walk", heading: "How far does chance go?",

@@ -6,6 +6,7 @@ import { keepChapter } from "../browser/local_storage.js"
 import { STILL } from "../browser/motion.js"
 import { plain } from "../browser/to_object.js"
 import { CHAPTERS, SUMMARY } from "./chapters.js"
+import { COVER, Cover } from "./cover.js"
 import { palette } from "./drawing/palette.js"
 import { ClosingPicture } from "./drawing/closing_picture.js"
 import { PredictDoSee } from "./predict_do_see.js"
@@ -14,7 +15,7 @@ import { Source } from "./source.js"
 
 // The data of later chapters, requested one after the other while the first is read, as some take
 // time.
-const AHEAD = [["scene", "groove"], ["scene", "box"], ["scene", "thirteen"], ["ends", "thirteen"], ["packing", "0.1"], ["rail"], ["shadow"], ["push", "0"], ["curve"], ["push", "1"]]
+const AHEAD = [["scene", "ladder"], ["scene", "groove"], ["scene", "box"], ["scene", "thirteen"], ["ends", "thirteen"], ["packing", "0.1"], ["rail", "grabbed"], ["shadow"], ["push", "0"], ["curve"], ["push", "1"]]
 
 class Lesson {
   constructor(model, view) {
@@ -31,7 +32,7 @@ class Lesson {
     model.on("palettes", () => this.paint())
     model.on("remove", () => this.leave())
     this.sized = new ResizeObserver(() => this.paint())
-    window.history.replaceState(null, "", this.address(CHAPTERS[this.named].name)) // for the way back
+    window.history.replaceState(null, "", this.address((CHAPTERS[this.named] ?? COVER).name)) // for the way back
     this.open(this.named)
   }
 
@@ -46,11 +47,11 @@ class Lesson {
     this.experiment = this.mechanism = null
   }
 
-  /** The chapter in the address, otherwise the first unfinished one. */
+  /** The number of the chapter in the address, otherwise of the first unfinished one; of the cover, -1, before any is begun. */
   get named() {
-    const name = new URLSearchParams(window.location.search).get("learn")
-    const chapter = CHAPTERS.find((one) => one.name === name) ?? CHAPTERS.find((one) => !this.progress.of(one.name).done)
-    return Math.max(0, CHAPTERS.indexOf(chapter))
+    const name = new URLSearchParams(window.location.search).get("learn"), named = CHAPTERS.findIndex((one) => one.name === name)
+    if (named >= 0 || !this.progress.begun) return named
+    return Math.max(0, CHAPTERS.findIndex((one) => !this.progress.of(one.name).done))
   }
 
   /** The address of a chapter, with all other parameters of this page. */
@@ -69,7 +70,7 @@ class Lesson {
 
   async open(number) {
     this.close()
-    const chapter = CHAPTERS[number], turn = ++this.openings
+    const chapter = CHAPTERS[number] ?? COVER, turn = ++this.openings
     this.number = number
     keepChapter(chapter.name)
     const parts = this.lay(chapter)
@@ -90,7 +91,8 @@ class Lesson {
     parts.text.append(" ", createElement("strong", { textContent: chapter.ask }))
     const save = (more) => { this.progress.set(chapter.name, more); this.show() }
     const again = () => { save({ prediction: null, done: false }); this.open(number) }
-    this.mechanism = new PredictDoSee({ ...chapter, x }, experiment, parts, this.progress.of(chapter.name), { save, again, drawn: () => this.paint() })
+    const drawn = () => this.paint()
+    this.mechanism = chapter === COVER ? new Cover(experiment, parts, drawn) : new PredictDoSee({ ...chapter, x }, experiment, parts, this.progress.of(chapter.name), { save, again, drawn })
     this.sized.observe(parts.picture)
     if (!this.model.alone && turn === 1) this.root.querySelector("h1").focus({ preventScroll: true }) // the next stop of the Tab key is the marker
     this.ahead ??= this.fetch()
@@ -108,14 +110,18 @@ class Lesson {
     voice.textContent = "Loading … The first time on a server, this can take a minute."
     const [picture, plot] = ["picture", "plot"].map((className) => createElement("figure", { className }))
     const knob = createElement("label", { className: "knob", hidden: true }), row = createElement("div", { className: "row" }), turn = createElement("span", { className: "turn" })
-    const next = last ? button("", () => after.scrollIntoView({ behavior: STILL.matches ? "auto" : "smooth" }))
+    const next = last ? button("", () => {
+      after.scrollIntoView({ behavior: STILL.matches ? "auto" : "smooth" })
+      if (this.mechanism && !STILL.matches) this.closing.play()
+    })
       : button("", () => this.go(number + 1), { innerHTML: `Next<span>: ${CHAPTERS[number + 1].title}</span> ▸` })
-    turn.append(button("◂", () => this.go(number - 1), { ariaLabel: "Back", disabled: !number }), next)
+    if (number >= 0) turn.append(button("◂", () => this.go(number - 1), { ariaLabel: "Back" }))
+    turn.append(next)
     row.append(turn)
     const { pathname } = window.location, { scene } = chapter.options
     const onwards = last ? `${SUMMARY}<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with this scene</a>` : ""
     const after = createElement("div", { className: "after", innerHTML: onwards })
-    Object.assign(this, { next, closing: last ? new ClosingPicture(after) : null })
+    Object.assign(this, { next, closing: last ? new ClosingPicture(after, (part) => this.experiment.drag(part * this.experiment.limit)) : null })
     const foot = createElement("div", { className: "foot" }) // always in view, as it says what to do next
     foot.append(voice, row)
     this.main.className = "waiting"

@@ -76,8 +76,8 @@ class Lesson(Scripted):
                 self._send("shadow", "", packings.shadow, computing)
             case "rail" if network is not None:
                 self._send("rail", name, lambda: packings.rail_from(name, network), computing)
-            case "rail":
-                self._send("rail", "", packings.rail, computing)
+            case "rail" if name in lesson_data.MARKED:
+                self._send("rail", name, lambda: packings.rail(name), computing)
             case "push" if name in STARTS:
                 self._send("push", name, lambda: packings.push(STARTS[name]), computing)
             case "curve":

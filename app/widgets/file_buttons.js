@@ -5,10 +5,8 @@ import { composed, plotsSeen, printFigure } from "./composed_figure.js"
 import { button, createElement } from "../browser/dom.js"
 import { plain } from "../browser/to_object.js"
 import { save } from "../browser/download.js"
+import { recorded } from "../browser/movie.js"
 
-const RATE = 6e6 // bits per second of a movie
-const LONGEST_MS = 60000 // of a movie
-const HELD_MS = 500 // hold on the last network at the end of a movie; a shorter one would be lost
 const SIDE = 900 // pixels of a movie, equal to the picture whose caption it has
 const WHERE = [888, 60] // pixels in its caption, where the number of the network ends
 const SCALE = 2 // pixels of a PNG per pixel of its SVG
@@ -43,24 +41,16 @@ export function render({ model, view }) {
   }
 
   /** A movie of the animation, from the first state to the last, or once to and fro. */
-  async function recorded(caption, button) {
+  async function filmed(caption, button) {
     const stage = player(), { scene } = stage, layers = [scene.disks, scene.chains, scene.marks]
     const { position } = stage.replay, picture = await imageOf(drawn(caption)), height = picture.naturalHeight - SIDE
     const canvas = createElement("canvas", { width: SIDE, height: (SIDE + height) & ~1 })
-    const context = canvas.getContext("2d"), pieces = []
-    const stream = canvas.captureStream(30)
-    const recorder = new MediaRecorder(stream, { mimeType: "video/webm", videoBitsPerSecond: RATE })
-    recorder.ondataavailable = (event) => pieces.push(event.data)
-    const ended = new Promise((resolve) => { recorder.onstop = resolve })
-    const { view } = scene
+    const context = canvas.getContext("2d"), { view } = scene, words = button.textContent
     scene.reset(false) // whole, like the scale in its caption
     scene.finer(SIDE)
     stage.show(0, false)
     stage.play(true)
-    recorder.start(250)
-    const begun = performance.now(), words = button.textContent
-    let over // time at which the last network was shown
-    const frame = (now) => {
+    const movie = await recorded(canvas, (ms) => {
       context.fillStyle = caption.background
       context.fillRect(0, 0, canvas.width, canvas.height)
       for (const layer of layers) context.drawImage(layer.canvas, 0, 0)
@@ -69,22 +59,16 @@ export function render({ model, view }) {
       context.font = "15px Helvetica, Arial, sans-serif"
       context.textAlign = "right"
       context.fillText(stage.replay.title, WHERE[0], SIDE + WHERE[1])
-      button.textContent = `recording … ${Math.round((now - begun) / 1000)} s`
-      const swung = stage.replay.swinging && stage.playback.turns > 1
-      if (!stage.playing || swung) over ??= now
-      if ((now - over > HELD_MS && pieces.some(({ size }) => size)) || now - begun > LONGEST_MS) recorder.stop()
-      else requestAnimationFrame(frame)
-    }
-    requestAnimationFrame(frame)
-    await ended
-    const duration = performance.now() - begun
+      button.textContent = `recording … ${Math.round(ms / 1000)} s`
+      return !stage.playing || (stage.replay.swinging && stage.playback.turns > 1)
+    }, "video/webm")
     stage.play(false)
     scene.view = view // as it was on screen
     scene.size = 0
     scene.resize()
     stage.show(position)
     button.textContent = words
-    return timed(new Blob(pieces, { type: "video/webm" }), duration)
+    return movie
   }
 
   async function imageOf(svg) {
@@ -108,7 +92,7 @@ export function render({ model, view }) {
     if (file.width) return together(file, caption)
     let blob
     if (!caption) blob = new Blob([file.content], { type: file.mime })
-    else if (file.name.endsWith(".webm")) blob = await recorded(caption, root.querySelector(".webm"))
+    else if (file.name.endsWith(".webm")) blob = await filmed(caption, root.querySelector(".webm"))
     else blob = drawn(caption)
     if (caption && file.name.endsWith(".png")) blob = await rendered(blob)
     save(blob, file.name)
@@ -126,23 +110,4 @@ export function render({ model, view }) {
   model.on("msg:custom", take)
   offer()
   return root
-}
-
-// Recorders do not write the duration, without which players cannot seek.
-
-const INFO = [0x15, 0x49, 0xa9, 0x66], DURATION = [0x44, 0x89, 0x88] // EBML: ids, and 8 bytes that follow
-
-/** A WebM with its duration (ms) in its Info element; unchanged if that is not found. */
-async function timed(movie, duration) {
-  const bytes = new Uint8Array(await movie.arrayBuffer())
-  const at = bytes.subarray(0, 1000).findIndex((_, k) => INFO.every((byte, n) => bytes[k + n] === byte))
-  const size = bytes[at + 4] & 0x7f // one byte long, marked by its highest bit
-  if (at < 0 || !(bytes[at + 4] & 0x80) || size === 0x7f) return movie
-  const written = new DataView(new ArrayBuffer(8)), longer = new DataView(new ArrayBuffer(8)), end = at + 5 + size
-  written.setFloat64(0, duration)
-  longer.setBigUint64(0, (1n << 56n) | BigInt(size + DURATION.length + 8)) // a size of eight bytes
-  const parts = [
-    bytes.subarray(0, at + 4), longer, bytes.subarray(at + 5, end), new Uint8Array(DURATION), written, bytes.subarray(end),
-  ]
-  return new Blob(parts, { type: movie.type })
 }

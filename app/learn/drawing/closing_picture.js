@@ -3,19 +3,39 @@
 import { circle, font, line } from "../../browser/canvas_paths.js"
 import { createElement, button } from "../../browser/dom.js"
 import { save } from "../../browser/download.js"
+import { recorded } from "../../browser/movie.js"
 import { Scale, told } from "./quantity_plot.js"
 
 const WIDE = 1200, HIGH = 630 // px, as links are previewed
-const RAIL = { left: 830, right: 1010, top: 190, step: 50 } // of the predictions
+const RAIL = { left: 850, right: 1010, top: 190, step: 50 } // of the predictions
+const PUSH_MS = 4000, MOVES_MS = 2500 // of the movie: a growing push, and the motion that ends it
 const TITLE = ["How far can forces go", "while nothing moves?"]
 
 /** The answer of a chapter in words: one value, or both ends. */
 const answered = ({ x, answer }) => [...new Set(answer.map((value) => told(x, value)))].join(" to ")
 
 export class ClosingPicture {
-  constructor(host) {
-    this.canvas = createElement("canvas", { width: WIDE, height: HIGH, role: "img" })
-    host.prepend(this.canvas, button("Save this picture", () => this.canvas.toBlob((blob) => save(blob, "granforce-lesson.png")), { className: "save" }))
+  /** push(part): called to show the packing under this part of the largest push. */
+  constructor(host, push) {
+    const canvas = this.canvas = createElement("canvas", { width: WIDE, height: HIGH, role: "img" })
+    this.push = (ms) => {
+      push(Math.min(1, ms / PUSH_MS))
+      return ms > PUSH_MS + MOVES_MS
+    }
+    const film = async (pressed) => {
+      const { textContent: words } = pressed
+      Object.assign(pressed, { disabled: true, textContent: "Recording …" })
+      const movie = await recorded(canvas, this.push)
+      Object.assign(pressed, { disabled: false, textContent: words })
+      save(movie, `granforce-lesson.${movie.type.match(/\w+$/)}`)
+    }
+    host.prepend(canvas, button("Save as a movie", film, { className: "save" }), " ", button("Save as a picture", () => canvas.toBlob((blob) => save(blob, "granforce-lesson.png")), { className: "save" }))
+  }
+
+  /** Let the packing be pushed once more, until it moves. */
+  play() {
+    const begun = performance.now(), frame = (now) => this.canvas.isConnected && !this.push(now - begun) && requestAnimationFrame(frame)
+    requestAnimationFrame(frame)
   }
 
   /** scene: the packing on screen; chapters: [{title, x: axis, prediction, answer: [low, high]}]; look: as from palette. */

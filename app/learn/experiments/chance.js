@@ -8,8 +8,8 @@ const SECONDS = 8 // for the whole walk
 
 export class Chance extends PackingExperiment {
   async load(source) {
-    const [packing, { other, outline, share }] = await Promise.all([source.get("packing", "0.1"), source.get("shadow")])
-    const contact = packing.grabbed, force = (row, c) => packing.normal[row * packing.contacts + c]
+    const [packing, { outline, share }] = await Promise.all([source.get("packing", "0.1"), source.get("shadow")])
+    const { grabbed: contact, other } = packing, force = (row, c) => packing.normal[row * packing.contacts + c]
     Object.assign(this, { packing, contact, share, steered: false, outline: unflat([...outline]), row: 0 })
     this.network = this.before = this.asPacked(packing)
     this.canvas.show(packing, null)
@@ -17,8 +17,8 @@ export class Chance extends PackingExperiment {
     this.drawn = [...packing.number].map((number, row) => Object.assign([force(row, contact), force(row, other)], { number }))
   }
 
-  /** Predictions cannot be outside the range that the text gives. */
-  get possible() { return [this.packing.least[this.contact], this.packing.largest[this.contact]] }
+  /** Predictions are possible, and not below the force that the walk begins with. */
+  get possible() { return [this.before[this.contact], this.packing.largest[this.contact]] }
 
   get answer() { return this.packing.high[this.contact] }
 

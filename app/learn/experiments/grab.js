@@ -1,5 +1,6 @@
 // One force of 400 disks is dragged: all others follow along networks computed by the server. The
-// marked one is asked for, but any other can be dragged too, from the network on screen.
+// marked one is asked for, but any other can be dragged too, from the network on screen. options: marked: which contact is
+// marked, as the packing names it; axes of the small plot, with `across` and `up`: the forces on them.
 
 import { networkAt } from "../../packing/replay/replay.js"
 import { OPENS } from "../../packing/drawing/first_motion.js"
@@ -13,14 +14,14 @@ const LONG = 1.6 // a drag over the whole picture, relative to the distance betw
 
 export class Grab extends PackingExperiment {
   async load(source) {
-    const packing = await source.get("packing", "0.1"), contact = packing.grabbed
+    const { marked, axes } = this.options, packing = await source.get("packing", "0.1"), contact = packing[marked]
     Object.assign(this, { source, packing, contact, held: null })
     this.network = this.before = this.asPacked(packing)
     this.tangential = packing.tangential.subarray(0, packing.contacts)
     this.start = this.value
     this.canvas.show(packing, contact)
-    this.box = new SceneInHand(await source.get("scene", "box"), () => {}).body
-    this.fetched = source.get("rail").then((rail) => { this.rail = this.first = { ...rail, contact } })
+    if (axes) this.box = new SceneInHand(await source.get("scene", "box"), () => {}).body
+    this.fetched = source.get("rail", marked).then((rail) => { this.rail = this.first = { ...rail, contact } })
   }
 
   /** The force of the marked line. */
@@ -30,17 +31,18 @@ export class Grab extends PackingExperiment {
 
   get facts() {
     const { packing, contact } = this
-    return { ...this.counted(packing), start: this.start, low: packing.least[contact], high: packing.largest[contact], changed: this.changes, ...this.atEnd }
+    return { ...this.counted(packing), start: this.start, low: packing.least[contact], high: packing.largest[contact], changed: this.changesTo(this.first?.normal.subarray(-packing.contacts) ?? []), ...this.atEnd }
   }
+
+  /** The least and the largest value of the marked line that its rail reaches. */
+  get reach() { return [this.rail.values[0], this.rail.values.at(-1)] }
 
   /** A promise: dragging has to wait for the first rail. */
   ready() { return this.fetched }
 
-  /** Number of other forces that change from the first network to the end of its rail. */
-  get changes() {
-    const { first, contact } = this
-    const end = first?.normal.subarray(-this.packing.contacts) ?? []
-    return end.reduce((sum, v, c) => sum + (Math.abs(v - this.before[c]) > CHANGED && c !== contact ? 1 : 0), 0)
+  /** Number of other forces that change from the first network to this one. */
+  changesTo(network) {
+    return network.reduce((sum, v, c) => sum + (Math.abs(v - this.before[c]) > CHANGED && c !== this.contact ? 1 : 0), 0)
   }
 
   /** At the end of the first rail: contacts that are open or slip, and disks that have lost all their contacts. */

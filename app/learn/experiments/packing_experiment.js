@@ -23,8 +23,8 @@ export class PackingExperiment {
   /** The first network of a packing, in which it came to rest. */
   asPacked(packing) { return packing.normal.subarray(0, packing.contacts) }
 
-  /** Contacts that are open, or slip, on the network on screen; null if it has no friction, and before a prediction. */
-  get limited() { return this.locked || !this.tangential ? null : this.marks(this.network, this.tangential) }
+  /** Contacts that are open, or slip, on the network on screen; null if it has no friction, before a prediction, and in a plain picture. */
+  get limited() { return this.locked || !this.tangential || this.options.plain ? null : this.marks(this.network, this.tangential) }
 
   /** Contacts of a network that are open, or slip, as in drawLimits. */
   marks(normal, tangential) {

@@ -92,9 +92,9 @@ export class SceneExperiment {
 
   /** S at another friction, in words. */
   get headline() {
-    const { varied, bodies, body, S: { bounds: [low, high] = [] } = {} } = this, mu = this.friction
+    const { varied, scene, body, S: { bounds: [low, high] = [] } = {} } = this, mu = this.friction
     if (!varied) return ""
-    if (low === undefined) return `${mu}: nothing holds the ${bodies}, S is empty.`
+    if (low === undefined) return `${mu}: nothing holds ${scene.r.length > 1 ? "them" : "it"}, S is empty.`
     if (!body.bounded) return `${mu}: S has no end.`
     return high - low < 1e-6 ? `${mu}: S is one point, ${low.toFixed(2)}.` : `${mu}: from ${low.toFixed(2)} to ${high.toFixed(2)}.`
   }

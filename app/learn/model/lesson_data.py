@@ -26,6 +26,7 @@ MU = 0.1  # of the packing that is pulled and pushed
 NEAR = 0.5  # largest distance of a marked contact from the centre, in half view widths
 STRONG = 1.5  # least force of the contact that is pulled, ⟨f_n⟩
 FIRM = 0.5  # least critical force of the contact that is pushed, ⟨f_n⟩
+MARKED = ("grabbed", "other")  # the contacts that are pulled, as in `Packings.packing`
 STARTS = 4  # networks from which it is pushed: as packed, and others of the stored walk
 
 BAND = np.linspace(0, 0.9999, 9)  # pushes at which S is measured, relative to the limit load
@@ -68,7 +69,7 @@ class Packings:
         for cell in cells:
             if cell.series == series and cell.mu > 0:
                 self.cells[cell.mu] = cell
-        self.rail = lru_cache(1)(self._rail)
+        self.rail = lru_cache(len(MARKED))(self._rail)
         self.band = lru_cache(1)(self._band)
         self.push = lru_cache(STARTS)(self._push)
         self.shadow = lru_cache(1)(self._shadow)
@@ -85,54 +86,59 @@ class Packings:
         return self.library.shown(self.cells[mu])
 
     def packing(self, mu: float) -> dict[str, Any]:
-        """Disks, networks and exact intervals at μ, with counts; forces in ⟨f_n⟩."""
+        """Disks, networks and exact intervals at μ, with counts; forces in ⟨f_n⟩.
+
+        grabbed: of the strong contacts near the centre, the least determined one; other: the least
+        determined one near the centre that shares no disk with it.
+        """
         replay, exact = self.shown(mu).replay, self.shown(mu).exact
         if exact is None:
             raise InputError("this chapter needs exact intervals that the store does not have")
         bounds, summary = exact_intervals(exact, replay), replay.summary
+        grabbed, other = self._marked(mu)
         return {
             **frames(replay),
             "least": bounds["low"],
             "largest": bounds["high"],
-            "grabbed": self._grabbed(mu),
+            "grabbed": grabbed,
+            "other": other,
             "spread": summary["eta1"],
             "disks": summary["n"] - summary["rattlers"],
             "all_disks": summary["n"],
         }
 
-    def _grabbed(self, mu: float) -> int:
-        """The contact to pull: of the strong ones near the centre, the least determined one."""
+    def _marked(self, mu: float) -> tuple[int, int]:
+        """The two contacts of MARKED."""
         replay = self.shown(mu).replay
         bounds = exact_intervals(self.shown(mu).exact, replay)
-        fits = (_away(replay) < NEAR) & (replay.normal[0] > STRONG)
-        return int(np.argmax(np.where(fits, bounds["high"] - bounds["low"], -1.0)))
+        disks, near = np.column_stack([replay.i, replay.j]), _away(replay) < NEAR
+
+        def widest(fits: npt.NDArray[np.bool_]) -> int:
+            return int(np.argmax(np.where(near & fits, bounds["high"] - bounds["low"], -1.0)))
+
+        grabbed = widest(replay.normal[0] > STRONG)
+        return grabbed, widest(~np.isin(disks, disks[grabbed]).any(axis=1))
 
     def _shadow(self) -> dict[str, Any]:
-        """S on the forces of the marked contact and of another one, and the share that walks fill.
-
-        other: the least determined contact near the centre that shares no disk with the marked one.
-        """
-        replay, exact = self.shown(MU).replay, self.shown(MU).exact
-        bounds, marked = exact_intervals(exact, replay), self._grabbed(MU)
-        disks = np.column_stack([replay.i, replay.j])
-        fits = (_away(replay) < NEAR) & ~np.isin(disks, disks[marked]).any(axis=1)
-        other = int(np.argmax(np.where(fits, bounds["high"] - bounds["low"], -1.0)))
+        """S on the forces of both marked contacts, and the share that walks fill."""
+        replay, marked = self.shown(MU).replay, list(self._marked(MU))
         packing = self.library.packing(self.cells[MU].params["packing"])
-        forces = [2 * int(replay.backbone[contact]) for contact in (marked, other)]
+        forces = [2 * int(replay.backbone[contact]) for contact in marked]
         outline = hulls.outline(packing, forces) / replay.force_scale
-        walked = replay.normal[1:, [marked, other]]
+        walked = replay.normal[1:, marked]
         share = planes.area(walked) / planes.area(outline)
-        return {"other": other, "outline": outline.ravel(), "share": share}
+        return {"outline": outline.ravel(), "share": share}
 
     def _puller(self) -> Puller:
         cell = self.cells[MU]
         return Puller(self.library.packing(cell.params["packing"]), cell.mu)
 
-    def _rail(self) -> dict[str, Any]:
-        """Networks from the least to the largest force of the marked contact, as packed."""
+    def _rail(self, marked: str) -> dict[str, Any]:
+        """Networks from the least to the largest force of a contact of MARKED, as packed."""
         replay = self.shown(MU).replay
         as_packed = np.concatenate([replay.normal[0], replay.tangential[0]])
-        return self.rail_from(str(self._grabbed(MU)), as_packed)
+        contact = self._marked(MU)[MARKED.index(marked)]
+        return self.rail_from(str(contact), as_packed)
 
     def rail_from(self, contact: str, network: npt.ArrayLike) -> dict[str, Any]:
         """Networks from the least to the largest force of a contact, near a given network.

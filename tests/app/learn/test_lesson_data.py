@@ -46,7 +46,7 @@ def test_the_same_disks_give_way_at_other_pushes_from_other_forces(packings):
 def test_the_walk_fills_a_small_part_of_the_shadow_of_s(packings):
     shadow, packing = packings.shadow(), packings.packing(0.1)
     outline = shadow["outline"].reshape(-1, 2)
-    for k, contact in enumerate((packing["grabbed"], shadow["other"])):
+    for k, contact in enumerate((packing["grabbed"], packing["other"])):
         ends = packing["least"][contact], packing["largest"][contact]
         np.testing.assert_allclose((outline[:, k].min(), outline[:, k].max()), ends, atol=0.01)
     assert 0.05 < shadow["share"] < 0.2
