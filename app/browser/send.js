@@ -1,3 +1,5 @@
+// Messages to the server, and data from it.
+
 /** Send a message to the server. */
 export function ask(model, view, message) {
   knownThere(view.model.document)
@@ -16,4 +18,9 @@ export function knownThere(page) {
     for (const model of page._new_models) if (/^p\d+$/.test(model.id)) page._new_models.delete(model)
     return create(events)
   }
+}
+
+/** Data from the server, a Map or a plain object, as a plain object. */
+export function plain(given) {
+  return given instanceof Map ? Object.fromEntries(given) : given
 }

@@ -1,9 +1,8 @@
 // The line at the bottom: a failure, or the progress of a computation, or the reliability of the
 // numbers on screen; and, until it is closed, where new visitors can begin.
-import { ask } from "../browser/send.js"
+import { ask, plain } from "../browser/send.js"
 import { button, createElement } from "../browser/dom.js"
 import { knows, remember } from "../browser/local_storage.js"
-import { plain } from "../browser/to_object.js"
 
 const NEW = "learn" // name under which a browser remembers that the line for new visitors was closed
 const LATE_MS = 200 // after which a computation is shown; shorter ones would flicker

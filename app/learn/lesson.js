@@ -4,7 +4,7 @@
 import { button, createElement } from "../browser/dom.js"
 import { keepChapter } from "../browser/local_storage.js"
 import { STILL } from "../browser/motion.js"
-import { plain } from "../browser/to_object.js"
+import { plain } from "../browser/send.js"
 import { CHAPTERS, SUMMARY } from "./chapters.js"
 import { COVER, Cover } from "./cover.js"
 import { palette } from "./drawing/palette.js"

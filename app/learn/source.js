@@ -1,7 +1,6 @@
 // Data for chapters, requested from the server once: scenes, packings, and computed results.
 
-import { ask } from "../browser/send.js"
-import { plain } from "../browser/to_object.js"
+import { ask, plain } from "../browser/send.js"
 
 export class Source {
   constructor(model, view) {

@@ -2,13 +2,12 @@
 // the plots next to them follow, without telling the server.
 
 import { actions } from "./hand/actions.js"
-import { ask, knownThere } from "../browser/send.js"
+import { ask, knownThere, plain } from "../browser/send.js"
 import { Buttons } from "./buttons.js"
 import { Grab, UNCHOSEN } from "./hand/drag_force.js"
 import { extend, Live, roomy } from "./replay/live.js"
 import { Look } from "./drawing/chain_style.js"
 import { STILL } from "../browser/motion.js"
-import { plain } from "../browser/to_object.js"
 import { Pins } from "./drawing/pins.js"
 import { drawMotion } from "./drawing/first_motion.js"
 import { drawThrust } from "./drawing/thrust.js"

@@ -1,9 +1,8 @@
 // Buttons that request a file from the server and save it.
 
-import { ask } from "../browser/send.js"
+import { ask, plain } from "../browser/send.js"
 import { composed, plotsSeen, printFigure } from "./composed_figure.js"
 import { button, createElement } from "../browser/dom.js"
-import { plain } from "../browser/to_object.js"
 import { save } from "../browser/download.js"
 import { recorded } from "../browser/movie.js"
 

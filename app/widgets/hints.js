@@ -3,7 +3,7 @@
 
 import { createElement } from "../browser/dom.js"
 import { focused, outwards } from "../browser/kept_focus.js"
-import { plain } from "../browser/to_object.js"
+import { plain } from "../browser/send.js"
 
 const WAIT_MS = 250 // before a hint opens under a resting pointer
 const WIDGETS = "[role=tab], button, .number, .friction, " +

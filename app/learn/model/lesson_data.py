@@ -113,7 +113,7 @@ class Packings:
         bounds = exact_intervals(self.shown(mu).exact, replay)
         disks, near = np.column_stack([replay.i, replay.j]), _away(replay) < NEAR
 
-        def widest(fits: npt.NDArray[np.bool_]) -> int:
+        def widest(fits: Any) -> int:
             return int(np.argmax(np.where(near & fits, bounds["high"] - bounds["low"], -1.0)))
 
         grabbed = widest(replay.normal[0] > STRONG)

@@ -1,6 +1,6 @@
 // The look of the forces: width, colour and marks of each contact's chain, as set in the model.
 
-import { plain } from "../../browser/to_object.js"
+import { plain } from "../../browser/send.js"
 import { touching } from "./images.js"
 
 export const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn

@@ -3,7 +3,7 @@
 
 import { arrow, circle, font } from "../../browser/canvas_paths.js"
 import { markSelected } from "./marks.js"
-import { plain } from "../../browser/to_object.js"
+import { plain } from "../../browser/send.js"
 
 const PIN = 17 // px, its height
 const ARROW_PX = 10, GROWN_PX = 100 // length beyond the edge of the pushed disk: least, and the largest addition

@@ -4,7 +4,7 @@
 
 import { Look } from "./chain_style.js"
 import { createElement } from "../../browser/dom.js"
-import { plain } from "../../browser/to_object.js"
+import { plain } from "../../browser/send.js"
 import { Replay } from "../replay/replay.js"
 import { Scene } from "./scene.js"
 

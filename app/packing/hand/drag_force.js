@@ -4,7 +4,7 @@
 
 import { CARRYING } from "../drawing/chain_style.js"
 import { circle, font, line } from "../../browser/canvas_paths.js"
-import { plain } from "../../browser/to_object.js"
+import { plain } from "../../browser/send.js"
 import { PointHand } from "./drag_point.js"
 import { networkAt } from "../replay/replay.js"
 

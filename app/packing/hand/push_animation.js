@@ -4,7 +4,7 @@
 
 import { FORCES } from "../replay/live.js"
 import { networkAt } from "../replay/replay.js"
-import { plain } from "../../browser/to_object.js"
+import { plain } from "../../browser/send.js"
 
 export class Pushed {
   constructor(player) {

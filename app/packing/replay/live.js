@@ -2,7 +2,7 @@
 
 import { CARRYING } from "../drawing/chain_style.js"
 import { STILL } from "../../browser/motion.js"
-import { plain } from "../../browser/to_object.js"
+import { plain } from "../../browser/send.js"
 
 const GLIDE = 250 // ms of the transition from the view of the moving packing to that of the finished one
 export const CATCH_UP = 0.6 // s by which the player stays behind the newest state

@@ -1,8 +1,7 @@
 // Stored computations: name, kind, time, size; to open or delete.
 
-import { ask } from "../../../browser/send.js"
+import { ask, plain } from "../../../browser/send.js"
 import { button, createElement } from "../../../browser/dom.js"
-import { plain } from "../../../browser/to_object.js"
 
 export function render({ model, view }) {
   const root = document.createElement("details")
