@@ -1,15 +1,19 @@
 // The eight chapters: their text, as functions of the numbers on screen, and the experiment of
 // each.
 
+import { AgainstFriction } from "./experiments/against_friction.js"
 import { Chance } from "./experiments/chance.js"
 import { Friction } from "./experiments/friction.js"
 import { Grab } from "./experiments/grab.js"
+import { HeldForces } from "./experiments/held_forces.js"
 import { Push } from "./experiments/push.js"
 import { SceneExperiment } from "./experiments/scene_experiment.js"
 
 const two = (v) => v.toFixed(2)
 const listed = (words) => new Intl.ListFormat("en-GB").format(words)
 const touching = ({ contacts, disks }) => 2 * contacts / disks
+/** Once S has no end: why; otherwise this question. */
+const prompted = ({ endless }, question) => (endless ? "Two contacts now lie in each other’s wedges: they can press on what is between them as hard as you like, since such forces cancel." : question)
 const percent = (v) => `${Math.round(100 * v)}\u00a0%`
 const raised = (v) => [...String(v)].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("")
 // Without walls: further rows of the count.
@@ -18,18 +22,23 @@ const PRESSED = [
   ["one more: the pressure on all sides is given", "+ 1"],
 ]
 
+const tabled = (rows) => `<table>${rows.map((row) => `<tr>${row.map((cell) => `<td>${cell}</td>`).join("")}</tr>`).join("")}</table>`
+
+/** Text that a reader may open; nothing if there is none. */
+const folded = (title, html) => (html ? `<details><summary>${title}</summary>${html}</details>` : "")
+
 /** Contacts at their limits against free numbers, in words; nothing if fewer forces are fixed than numbers were free. */
 function fixed(opened, sliding, bare, free) {
   const forces = 2 * opened + sliding, known = 3 * bare
   const rest = known ? `${known} of them replace the equations of ${bare > 1 ? `${bare} disks` : "the disk"} left without contacts; the other ${forces - known}` : "They"
-  return forces - known < free ? "" : ` That fixes 2 × ${opened} + ${sliding} = ${forces} forces. ${rest} use up all ${free} free numbers.`
+  return forces - known < free ? "" : `An open contact fixes two forces, a sliding one fixes one: 2 × ${opened} + ${sliding} = ${forces}. ${rest} use up all ${free} free numbers.`
 }
 
 /** The largest force in a groove of two walls at 45° as a linear program, folded. */
-const PROGRAM = `<details><summary>A linear program, written out: the groove of chapter 2</summary><table>${[
+const PROGRAM = folded("A linear program, written out: the groove of chapter 2", tabled([
   ["largest", "N₁"], ["no net force sideways", "N₁ − T₁ = N₂ − T₂"], ["none up or down", "N₁ + T₁ + N₂ + T₂ = √2 × weight"], ["no turning", "T₁ = T₂"],
   ["friction is limited (T: up along the wall)", "−μN₁ ≤ T₁ ≤ μN₁, −μN₂ ≤ T₂ ≤ μN₂"], ["walls only press", "N₁ ≥ 0, N₂ ≥ 0"], ["the corner found, for μ = 0.5", "N₁ = N₂ = 1.41, T₁ = T₂ = −0.71"],
-].map((row) => `<tr>${row.map((cell) => `<td>${cell}</td>`).join("")}</tr>`).join("")}</table></details>`
+]))
 
 export const SUMMARY = `<ul>
   <li><b>S</b>: all sets of forces that hold the same disks.</li>
@@ -50,12 +59,12 @@ function counted({ contacts, disks, equations, free }, pressed) {
 
 /**
  * Each chapter: name in links; title in the list; heading; text and ask, shown first; doing(facts), the instruction
- * for dragging; see(facts): reason, surprise and more, as HTML; verdict(facts, prediction): in place of "It is …"; count(facts):
+ * for dragging; see(facts): reason, surprise and more, as HTML; verdict(facts, prediction): in place of "It is …"; card: the question in the last picture; count(facts):
  * the rows of a sum, live during dragging if `live`; x, y, second: axes; experiment with options.
  */
 export const CHAPTERS = [
   {
-    name: "ladder", title: "A ladder", heading: "Which will it be?",
+    name: "ladder", title: "A ladder", card: "A ladder’s force on the wall (its weight = 1)", heading: "Which will it be?",
     text: ({ mu }) => `A ladder of weight 1 leans against a rough wall on a rough floor: friction is at most μ = ${mu} times the normal force (blue wedges). A mechanics course solves it without friction at the wall. With it, four forces are unknown, two at each end, and there are three equations of balance.`,
     ask: "The arrows show one solution. How large is the wall’s normal force?",
     doing: () => "Drag the dot to both ends, and past them, or drag an arrow. Wherever you stop in between, the ladder is in balance.",
@@ -63,69 +72,67 @@ export const CHAPTERS = [
       answer: `Anything from ${two(low)} to ${two(high)}.`,
       so: prediction < low || prediction > high ? ", which is not among them" : ": possible, like all the others",
     }),
-    see: ({ low, high, smooth }) => [
+    see: ({ low, high, smooth, endless }) => [
       `At ${two(low)} the wall’s friction holds the ladder up as hard as it can; at ${two(high)} it pulls it down. Textbooks make the wall smooth and keep the floor rough: only ${two(smooth)} is left. (The slider changes both.)`,
-      "A real ladder does take one of these values. Which one depends on how it bends and was set up, and a rigid body knows neither. So we ask: what is possible? <b>All sets of forces that hold it are called S</b>: the blue bar, if there is any.",
+      prompted({ endless }, "A real ladder takes one of the possible values. Which one depends on how it bends and was set up, and a rigid body knows neither. So we ask: what is possible? <b>All sets of forces that hold it are called S</b>: the blue bar."),
     ],
     x: { low: 0, high: 0.6, label: "normal force at the wall (weight of the ladder = 1)" }, y: null,
     experiment: SceneExperiment, options: { scene: "ladder", x: 2, y: null, goal: "both" },
   },
   {
-    name: "groove", title: "One disk in a groove", heading: "How hard does the wall press?",
-    text: ({ mu }) => `A disk of weight 1 lies between two walls. Each wall exerts a normal force on it and a friction force along the wall, at most ${mu} times the normal force. Four unknown forces, three equations of balance: one number stays free.`,
-    ask: "How large can the left wall’s normal force become?",
-    doing: () => "Drag the dot to the right as far as it goes, and further, or drag an arrow. All forces stay in balance; a wedge turns grey where its contact is about to slip.",
-    see: ({ low, high, mu }) => [
-      `At ${two(high)} the disk would slip upwards if friction did not pull it down along both walls, and friction gives ${two(mu * high)} at most: ${mu} × ${two(high)}. At ${two(low)} friction holds the disk up. So each wall can press harder than the disk weighs.`,
-      "Each point of the bar, S, is one set of forces that holds the disk. Which one is real depends on how the disk was pressed in and how it deforms, if only by a hair; we call disks rigid to leave both open. Now change the friction: at which μ is S one point, and from which μ on has it no end?",
+    name: "groove", title: "One disk in a groove", card: "Friction at which a groove jams a disk", heading: "How hard can a wall press?",
+    text: ({ mu, low, high }) => `A disk of weight 1 lies between two walls. Each exerts a normal force on it and a friction force along the wall, at most μ times as large (blue wedges). Four unknown forces, three equations: one number stays free. At μ = ${mu} the left wall’s normal force can be anything from ${two(low)} to ${two(high)}.`,
+    ask: "From which friction μ on can it be as large as you like?",
+    doing: () => "Drag the dot to the right; up and down changes the force at one μ, and an arrow can be dragged too. What is possible turns blue. A wedge turns grey where its contact is about to slip.",
+    see: ({ mu, low, high, smooth, answer }) => [
+      `From μ = ${answer} on, each contact lies in the other one’s wedge: the walls can press the disk between them as hard as you like, since such forces cancel. With less friction S has ends: ${two(low)} to ${two(high)} at μ = ${mu}, and ${two(smooth)} alone without friction.`,
+      "Above each μ, every point of the blue area is one set of forces that holds the disk. Which one is real depends on how the disk was pressed in and how it deforms, if only by a hair; we call disks rigid to leave both open.",
     ],
     count: (facts) => counted(facts, false),
-    x: { low: 0, high: 3, label: "normal force at the left wall (weight of the disk = 1)" }, y: null,
-    experiment: SceneExperiment, options: { scene: "groove", x: 0, y: null },
+    x: { low: 0, high: 1.2, label: "friction μ", symbol: "μ = " }, y: { low: 0, high: 4, label: "left wall’s normal force" },
+    experiment: AgainstFriction, options: { scene: "groove", x: 0, y: null, most: 1.2 },
   },
   {
-    name: "box", title: "Two disks in a box", heading: "How much can the floor carry?",
+    name: "box", title: "Two disks in a box", card: "Largest force on the floor below two disks of weight 1", heading: "How much can the floor carry?",
     text: ({ mu }) => `Two disks of weight 1 lie in a box, with friction of at most ${mu} times each normal force. Eight unknown forces, six equations: two numbers stay free, and S is an area. The axes of the plot are two of the forces, green and violet.`,
     ask: "How large can the floor’s normal force become?",
     doing: () => "Drag the dot as far as it goes: right, up, left and down. What its path encloses turns blue: between two possible sets of forces, every mixture is possible too.",
-    see: ({ high, weight, mu }) => [
+    see: ({ high, weight, mu, endless }) => [
       `Both disks weigh ${weight}. The other ${two(high - weight)} comes from the walls, where friction pulls the wedged disks down. With more, the lower disk would slip on the floor: friction is at its limit there, ${mu} × ${two(high)}.`,
-      "Every point of the polygon is one set of forces that holds the same two disks. Drag the dot along its edges: above the drawing you read what is about to slip. Then raise the friction: from which μ on can forces be as large as you like?",
+      prompted({ endless }, "Every point of the polygon is one set of forces that holds the same two disks. Drag the dot along its edges: above the drawing you read what is about to slip. Then raise the friction, until S has no end here either."),
     ],
     count: (facts) => counted(facts, false),
     x: { low: 1, high: 4, label: "normal force at the floor (green)" }, y: { low: 0, high: 5, label: "between the disks (violet)" },
     experiment: SceneExperiment, options: { scene: "box", x: 4, y: 0, goal: "round" },
   },
   {
-    name: "thirteen", title: "Thirteen disks", heading: "How strong can one contact get?",
-    text: ({ contacts, equations, free, disks, start, mu, mean }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations (counted later): S has ${free} dimensions. No screen can show them, so the plot has two of the forces as axes. The green one starts at ${two(start)}; the mean of all is ${two(mean)}.`,
-    ask: "How large can the green force become?",
-    doing: () => "Drag the dot to the right as far as it goes, or drag an arrow. All disks stay in balance. Grey wedge: a contact is about to slip; ring: about to open.",
-    see: ({ low, high, free, others }) => [
-      `At ${two(high)} so many contacts are about to open or to slip that none of the ${free} numbers is free any more. From ${two(low)} to ${two(high)} every value is possible, although no disk moves.`,
-      `${others ? "The dot stayed, the other forces changed: the plot is a shadow of S, with many points behind each of its points."
-        : others === false ? "Here, at the very edge, there is only one set of forces. Move the dot inside, then change the others."
-          : "The dot fixes two forces. And the others? Move it away from the edge, and press “Change the other forces”."} Then change the friction: how little is too little?`,
+    name: "thirteen", title: "Thirteen disks", card: "Two forces held: how many of 21 others change?", heading: "Two forces are held. And the others?",
+    text: ({ contacts, equations, free, disks, mu }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations: S has ${free} dimensions. A plot shows two of them, say the green and the violet force. Now these two of the ${contacts} normal forces are held.`,
+    ask: "How many of the others can still change?",
+    doing: () => "Drag the other arrows, or press “Change the others”. The green and the violet forces stay, and so does the balance of every disk.",
+    see: (facts) => [
+      `All of them: ${facts.free - 2} of the ${facts.free} numbers are still free, and every force depends on them. The dot in the lower plot stayed: behind each of its points lie many sets of forces. The blue area is only a shadow of S, as of a body on a wall.`,
+      folded(`Where the ${facts.equations} equations come from`, tabled(counted(facts, true))),
     ],
-    count: (facts) => counted(facts, true),
-    x: { low: 0, high: 7, label: "normal force between disks 1 and 12 (green)" }, y: { low: 0, high: 5, label: "between disks 8 and 13 (violet)" },
-    experiment: SceneExperiment, options: { scene: "thirteen", x: 6, y: 40 },
+    live: true,
+    x: { low: 0, high: 21, digits: 0, label: "other normal forces that can change" }, y: null,
+    experiment: HeldForces, options: { scene: "thirteen", x: 6, y: 40, axes: { x: { low: 0, high: 7, label: "green force" }, y: { low: 0, high: 4, label: "violet force" } } },
   },
   {
-    name: "four-hundred", title: "Four hundred disks", heading: "Grab one force",
+    name: "four-hundred", title: "Four hundred disks", card: "Largest force at one contact of 400 disks (mean = 1)", heading: "Grab one force",
     text: ({ all, disks, mu, start, contacts, free }) => `${all} disks at μ = ${mu}; ${all - disks} faint ones carry nothing. Lines join disks in contact, thicker for larger forces. As before, 2 × ${contacts} forces − (3 × ${disks} − 1) equations = ${free} free numbers: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean.`,
     ask: "How large can you make this force while no disk moves?",
     doing: () => "Drag the dot to the right, or the marked line upwards. Other lines follow: orange ones grow, blue ones shrink. Dots: about to slip; rings: about to open.",
     see: ({ high, opened, sliding, bare, changed, contacts, free }) => [
-      `At ${two(high)}, ${opened} contacts have lost both their forces (rings), and friction is at its limit at ${sliding} (dots).${fixed(opened, sliding, bare, free)} ${changed} other forces have changed by more than a tenth of the mean force; a photograph would look the same.`,
-      `How is ${two(high)} found? Balance and limits are linear, so S has flat sides, and the largest value of a force is at a corner, as for the box of chapter 3 (small plot). Finding this corner is called a linear program. A computer does it for all ${2 * contacts} forces in well under a second.`,
-      PROGRAM,
+      `There, ${opened} contacts are open (rings), and friction is at its limit at ${sliding} (dots): no number is free any more. ${changed} other forces have changed by more than a tenth of the mean force; a photograph would look the same.`,
+      `How is ${two(high)} found? S has flat sides, and the largest value of a force is at a corner, as for the box of chapter 3 (small plot). Finding it is called a linear program: a computer does it for all ${2 * contacts} forces in well under a second.`,
+      folded("How forces at their limits use up the free numbers", fixed(opened, sliding, bare, free)) + PROGRAM,
     ],
     x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: null,
     experiment: Grab, options: { marked: "grabbed", across: 4, up: 0, axes: { x: { low: 1, high: 4, label: "box of chapter 3: normal force at the floor" }, y: { low: 0, high: 5, label: "between the disks" } } },
   },
   {
-    name: "chance", title: "A random walk", heading: "How far does chance go?",
+    name: "chance", title: "A random walk", card: "Largest force that 1000 random steps find", heading: "How far does chance go?",
     text: ({ low, high, states }) => `By hand, the green force goes from ${two(low)} to ${two(high)}. Blue: all it can be together with a violet force, a shadow of S. Now chance walks through S in ${states} steps. Each changes all forces at random and then corrects them until all disks are in balance: a new network, one point of S.`,
     ask: "What is the largest green force that chance finds?",
     doing: ({ step }) => `Press “Walk”, or drag the slider. Each dot is ${step > 1 ? `a network, one after about every ${step} steps` : "a step"}; network 0 is the one in which the packing came to rest.`,
@@ -137,7 +144,7 @@ export const CHAPTERS = [
     experiment: Chance, options: {},
   },
   {
-    name: "friction", title: "Friction", heading: "Where are forces least determined?",
+    name: "friction", title: "Friction", card: "Friction at which forces are least determined", heading: "Where are forces least determined?",
     text: ({ all }) => `So far μ changed for the same disks. <b>Here each μ is a new packing</b> of ${all} disks, pressed together with this friction, and its forces walk through S, all sets of forces that hold it.`,
     ask: "At which friction μ do the forces vary most?",
     doing: () => "Drag the dot along the whole axis, to both ends. Blue: how much the forces vary. Grey: how many numbers are free.",
@@ -154,12 +161,12 @@ export const CHAPTERS = [
       [`free numbers, 2 × ${facts.contacts} − (3 × ${facts.disks} − 1)`, facts.free],
       ["forces vary by (typical deviation in the walk, mean force = 1)", percent(facts.spread)],
     ],
-    x: { low: 0.001, high: 10, log: true, label: "friction μ" }, y: { low: 0, high: 0.2, label: "forces vary by (mean force = 1)", follows: true }, second: { low: 0, high: 400, label: "free numbers" },
+    x: { low: 0.001, high: 10, log: true, label: "friction μ", symbol: "μ = " }, y: { low: 0, high: 0.2, label: "forces vary by (mean force = 1)", follows: true }, second: { low: 0, high: 400, label: "free numbers" },
     experiment: Friction, options: {},
   },
   {
-    name: "push", title: "Why it matters", heading: "When does something move?",
-    text: ({ mu }) => `The packing of chapter 5, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, step by step; all other forces give way just enough to balance the push.`,
+    name: "push", title: "Why it matters", card: "Largest push before a disk moves (mean force = 1)", heading: "When does something move?",
+    text: ({ mu }) => `The packing of chapter 5, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, step by step. Many points of S would balance the push; history picks one: each step starts from the last forces and changes them as little as it can.`,
     verdict: ({ limits: [first, ...others] }) => ({ answer: `It is ${two(first)}${others.length ? `; ${listed(others.map(two))} from other forces` : ""}.`, so: "" }),
     ask: "How hard can you push before a disk moves?",
     doing: () => "Drag the dot to the right, or an arrow away from the marked line. Blue dots: about to slip.",
@@ -168,7 +175,7 @@ export const CHAPTERS = [
         : pushed ? `Without a push, the two disks press on each other with ${two(carried)}.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
       ...(pushed ? [`A contact that slips stays at its friction limit, and the others have to balance the rest. At ${two(high)} (end of the line) they no longer can.`] : []),
-      `Other forces in S (blue) would balance a push up to ${two(limit)}, the limit load, but sliding disks do not search for them. So a limit computed from statics alone can be too high: for a silo, a slope, a foundation.`,
+      `Other forces in S (blue) would balance a push up to ${two(limit)}, the limit load, but sliding disks do not search for them. So statics alone promises too much, here ${percent(limit / high - 1)}, and limits of slopes and foundations are often computed from statics.`,
     ],
     x: { low: 0, high: 2, label: "push (mean force = 1)" }, y: { low: 0, high: 1.5, label: "force of the line", follows: true },
     experiment: Push, options: {},

@@ -9,13 +9,14 @@ import { CHAPTERS, SUMMARY } from "./chapters.js"
 import { COVER, Cover } from "./cover.js"
 import { palette } from "./drawing/palette.js"
 import { ClosingPicture } from "./drawing/closing_picture.js"
+import { Grab } from "./experiments/grab.js"
 import { PredictDoSee } from "./predict_do_see.js"
 import { Progress } from "./progress.js"
 import { Source } from "./source.js"
 
 // The data of later chapters, requested one after the other while the first is read, as some take
 // time.
-const AHEAD = [["scene", "ladder"], ["scene", "groove"], ["scene", "box"], ["scene", "thirteen"], ["ends", "thirteen"], ["packing", "0.1"], ["rail", "grabbed"], ["shadow"], ["push", "0"], ["curve"], ["push", "1"]]
+const AHEAD = [["scene", "ladder"], ["scene", "groove"], ["scene", "box"], ["scene", "thirteen"], ["outline", "thirteen"], ["packing", "0.1"], ["rail", "grabbed"], ["shadow"], ["push", "0"], ["curve"], ["push", "1"]]
 
 class Lesson {
   constructor(model, view) {
@@ -98,6 +99,16 @@ class Lesson {
     this.ahead ??= this.fetch()
   }
 
+  /** The experiment of chapter 5, for a movie. */
+  async pulled(host) {
+    const { source, model } = this, palettes = () => plain(model.palettes)
+    const grab = new Grab(host, { marked: "grabbed", plain: true }, () => {}, palettes())
+    grab.show = () => grab.draw(model.dark, palettes())
+    await grab.load(source)
+    await grab.ready()
+    return grab
+  }
+
   async fetch() {
     for (const [want, name] of AHEAD) await this.source.get(want, name).catch(() => {}) // the caller that needs it reports errors
   }
@@ -112,7 +123,6 @@ class Lesson {
     const knob = createElement("label", { className: "knob", hidden: true }), row = createElement("div", { className: "row" }), turn = createElement("span", { className: "turn" })
     const next = last ? button("", () => {
       after.scrollIntoView({ behavior: STILL.matches ? "auto" : "smooth" })
-      if (this.mechanism && !STILL.matches) this.closing.play()
     })
       : button("", () => this.go(number + 1), { innerHTML: `Next<span>: ${CHAPTERS[number + 1].title}</span> ▸` })
     if (number >= 0) turn.append(button("◂", () => this.go(number - 1), { ariaLabel: "Back" }))
@@ -121,7 +131,7 @@ class Lesson {
     const { pathname } = window.location, { scene } = chapter.options
     const onwards = last ? `${SUMMARY}<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with this scene</a>` : ""
     const after = createElement("div", { className: "after", innerHTML: onwards })
-    Object.assign(this, { next, closing: last ? new ClosingPicture(after, (part) => this.experiment.drag(part * this.experiment.limit)) : null })
+    Object.assign(this, { next, closing: last ? new ClosingPicture(after, (host) => this.pulled(host)) : null })
     const foot = createElement("div", { className: "foot" }) // always in view, as it says what to do next
     foot.append(voice, row)
     this.main.className = "waiting"
@@ -158,7 +168,7 @@ class Lesson {
       const { mechanism, experiment, model: { dark, palettes }, closing, progress } = this
       if (!mechanism) return
       if (experiment.draw(dark, plain(palettes))) this.paint()
-      else if (mechanism.stage === 2) closing?.draw(experiment.canvas.scene, CHAPTERS.map(({ name, title, x }) => ({ title, x, ...progress.of(name) })), palette(dark))
+      if (mechanism.stage === 2) closing?.draw(experiment.canvas.scene, CHAPTERS.map(({ name, card, x }) => ({ name, card, x, ...progress.of(name) })), palette(dark))
     })
   }
 }

@@ -15,9 +15,6 @@ from ..widgets.plot_style import palettes
 from .model import lesson_data
 from .model.lesson_data import Packings
 
-# The forces used as axes of S in each small scene, across and up, as in chapters.js.
-PLANES = {"ladder": (2, 0), "groove": (0, 2), "box": (4, 0), "thirteen": (6, 40)}
-
 # The networks from which a contact is pushed, by name.
 STARTS = {str(start): start for start in range(lesson_data.STARTS)}
 
@@ -64,11 +61,11 @@ class Lesson(Scripted):
         packings = self._packings
         by_friction = {f"{mu:g}": mu for mu in packings.frictions}
         match want:
-            case "scene" if name in PLANES:
+            case "scene" if name in lesson_data.SCENES:
                 pool = computing if EVERY[name].packed else reading
                 self._send("scene", name, lambda: lesson_data.scene(name), pool)
-            case "ends" if name in PLANES:
-                self._send("ends", name, lambda: lesson_data.ends(name, PLANES[name]), computing)
+            case "outline" if name in lesson_data.PLANES:
+                self._send("outline", name, lambda: lesson_data.outline(name), computing)
             case "packing":
                 mu = by_friction.get(name, float("nan"))
                 self._send("packing", name, lambda: packings.packing(mu))

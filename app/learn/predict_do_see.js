@@ -29,7 +29,7 @@ export class PredictDoSee {
   }
 
   /** A value of the quantity in question, in words. */
-  named(value) { return `${this.chapter.x.log ? "μ = " : ""}${told(this.chapter.x, value)}` }
+  named(value) { return `${this.chapter.x.symbol ?? ""}${told(this.chapter.x, value)}` }
 
   /** The slider of the experiment, with its name and a sentence about its value. */
   turnable() {
@@ -57,7 +57,7 @@ export class PredictDoSee {
   async begin() {
     this.save({ prediction: this.prediction, done: false })
     const unlocked = this.unlock()
-    ;(this.experiment.steered ? this.plot.dot : this.slider).focus({ preventScroll: true })
+    ;(this.experiment.steered ? this.plot.dot : this.slider ?? this.offer).focus({ preventScroll: true })
     await unlocked
     const last = this.knob.hidden ? this.chapter.live ? this.extra : this.host : this.knob
     last.style.scrollMarginBottom = `${this.foot.offsetHeight}px` // which covers what lies below
@@ -127,7 +127,7 @@ export class PredictDoSee {
       const words = stage === 0 ? PREDICT : this.ready ? chapter.doing(facts) : WAIT
       this.say(voice, [words], () => [createElement("p", { className: "todo", innerHTML: `<b>${STAGES[stage]}</b> ${words}` })])
     } else {
-      const { headline = "" } = experiment, sentences = chapter.see(facts).slice(headline ? -1 : 0) // the others are of the friction asked for
+      const { headline = "" } = experiment, sentences = facts.empty ? [] : chapter.see(facts).slice(headline ? -1 : 0) // the others are of the friction asked for
       this.say(voice, [headline, ...sentences], () => this.answer(headline, sentences))
     }
     const [count, aside] = stage === 2 || (stage && chapter.live) ? [chapter.count?.(facts), experiment.aside] : []

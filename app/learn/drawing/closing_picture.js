@@ -1,4 +1,4 @@
-// The end of the lesson: the last network, with all predictions beside the answers, as a picture to keep.
+// The end of the lesson: all predictions beside the answers, as a picture to keep, and a movie of a force that is pulled.
 
 import { circle, font, line } from "../../browser/canvas_paths.js"
 import { createElement, button } from "../../browser/dom.js"
@@ -7,65 +7,95 @@ import { recorded } from "../../browser/movie.js"
 import { Scale, told } from "./quantity_plot.js"
 
 const WIDE = 1200, HIGH = 630 // px, as links are previewed
-const RAIL = { left: 850, right: 1010, top: 190, step: 50 } // of the predictions
-const PUSH_MS = 4000, MOVES_MS = 2500 // of the movie: a growing push, and the motion that ends it
+const RAIL = { left: 670, right: 990, top: 186, step: 54 } // of the predictions
 const TITLE = ["How far can forces go", "while nothing moves?"]
+const MOVIE = { wide: 720, high: 900, edge: 72 } // px; edge: above the packing
+const UP_MS = 4000, DOWN_MS = 4000, ASKS_MS = 3000 // of the movie: the force grows, falls, and a question ends it
+const PULLED = "four-hundred" // the chapter of the force in the movie
 
 /** The answer of a chapter in words: one value, or both ends. */
 const answered = ({ x, answer }) => [...new Set(answer.map((value) => told(x, value)))].join(" to ")
 
+/** Where the lesson is, for others. */
+const address = ({ host, hostname, pathname }) => (hostname === "localhost" ? "granforce: forces in packings of disks" : `${host}${pathname}?learn`)
+
 export class ClosingPicture {
-  /** push(part): called to show the packing under this part of the largest push. */
-  constructor(host, push) {
+  /** pulled(host): a promise of the experiment of PULLED, drawn in this element. */
+  constructor(host, pulled) {
+    this.pulled = pulled
     const canvas = this.canvas = createElement("canvas", { width: WIDE, height: HIGH, role: "img" })
-    this.push = (ms) => {
-      push(Math.min(1, ms / PUSH_MS))
-      return ms > PUSH_MS + MOVES_MS
-    }
-    const film = async (pressed) => {
-      const { textContent: words } = pressed
-      Object.assign(pressed, { disabled: true, textContent: "Recording …" })
-      const movie = await recorded(canvas, this.push)
-      Object.assign(pressed, { disabled: false, textContent: words })
-      save(movie, `granforce-lesson.${movie.type.match(/\w+$/)}`)
-    }
-    host.prepend(canvas, button("Save as a movie", film, { className: "save" }), " ", button("Save as a picture", () => canvas.toBlob((blob) => save(blob, "granforce-lesson.png")), { className: "save" }))
+    const keep = () => canvas.toBlob((blob) => save(blob, "granforce-lesson.png"))
+    host.prepend(canvas, button("Save as a movie", (pressed) => this.film(pressed)), " ", button("Save as a picture", keep))
   }
 
-  /** Let the packing be pushed once more, until it moves. */
-  play() {
-    const begun = performance.now(), frame = (now) => this.canvas.isConnected && !this.push(now - begun) && requestAnimationFrame(frame)
-    requestAnimationFrame(frame)
-  }
-
-  /** scene: the packing on screen; chapters: [{title, x: axis, prediction, answer: [low, high]}]; look: as from palette. */
+  /** scene: the packing on screen; chapters: [{name, card, x: axis, prediction, answer: [low, high]}]; look: as from palette. */
   draw(scene, chapters, look) {
-    const g = this.canvas.getContext("2d"), { left, right, top, step } = RAIL, place = (x, value) => new Scale(x, left, right).px(Math.min(x.high, Math.max(x.low, value)))
-    const write = (text, x, y, colour, size) => { Object.assign(g, { fillStyle: colour, font: font(size) }); g.fillText(text, x, y) }
-    g.fillStyle = look.paper
-    g.fillRect(0, 0, WIDE, HIGH)
-    for (const { canvas } of [scene.disks, scene.chains, scene.marks]) g.drawImage(canvas, 0, 0, HIGH, HIGH)
-    TITLE.forEach((words, k) => write(words, HIGH + 40, 66 + 40 * k, look.ink, "bold 32px"))
-    write("○ my prediction", HIGH + 40, 150, look.hand, "18px")
-    write("● the answer", HIGH + 200, 150, look.cold, "18px")
+    Object.assign(this, { chapters, look })
+    const g = this.canvas.getContext("2d"), { left, right, top, step } = RAIL, write = writer(g), place = (x, value) => new Scale(x, left, right).px(Math.min(x.high, Math.max(x.low, value)))
+    this.packing(g, scene, 0, HIGH)
+    TITLE.forEach((words, k) => write(words, left, 56 + 38 * k, look.ink, "bold 32px"))
+    write("○ my prediction", left, 136, look.hand, "17px")
+    write("● the answer", left + 160, 136, look.cold, "17px")
     chapters.forEach((chapter, k) => {
-      const { title, x, prediction = null, answer } = chapter, y = top + step * k
-      write(title, HIGH + 40, y + 6, look.ink, "18px")
-      if (answer) write(`${prediction === null ? "" : `${told(x, prediction)} → `}${answered(chapter)}`, right + 16, y + 5, look.ink, "16px")
+      const { card, x, prediction = null, answer } = chapter, y = top + step * k
+      write(card, left, y - 14, look.ink, "17px")
+      if (answer) write(`${prediction === null ? "" : `${told(x, prediction)} → `}${answered(chapter)}`, right + 16, y + 8, look.ink, "16px")
       Object.assign(g, { strokeStyle: look.edge, lineWidth: 1.5 })
-      line(g, [left, y], [right, y])
+      line(g, [left, y + 3], [right, y + 3])
       if (answer) {
-        Object.assign(g, { strokeStyle: look.cold, lineWidth: 16, lineCap: "round" })
-        line(g, ...answer.map((value) => [place(x, value), y]))
+        Object.assign(g, { strokeStyle: look.cold, lineWidth: 14, lineCap: "round" })
+        line(g, ...answer.map((value) => [place(x, value), y + 3]))
       }
       if (prediction === null) return
-      circle(g, [place(x, prediction), y], 8)
+      circle(g, [place(x, prediction), y + 3], 7)
       Object.assign(g, { strokeStyle: look.hand, lineWidth: 3 })
       g.stroke()
     })
-    const { host: server, hostname, pathname } = window.location
-    write(hostname === "localhost" ? "granforce: forces in packings of disks" : `${server}${pathname}?learn`, HIGH + 40, 602, look.weight, "16px")
-    const named = chapters.filter(({ prediction, answer }) => answer && prediction !== null).map((chapter) => `${chapter.title}: ${told(chapter.x, chapter.prediction)}, answer ${answered(chapter)}`)
+    write(address(window.location), left, 616, look.weight, "15px")
+    const named = chapters.filter(({ prediction, answer }) => answer && prediction !== null).map((chapter) => `${chapter.card}: ${told(chapter.x, chapter.prediction)}, answer ${answered(chapter)}`)
     this.canvas.ariaLabel = `Your predictions. ${named.join("; ")}`
   }
+
+  /** A packing as on screen, on an empty picture: this far below its upper edge, and this wide. */
+  packing(g, { disks, chains, marks }, edge, side) {
+    g.fillStyle = this.look.paper
+    g.fillRect(0, 0, g.canvas.width, g.canvas.height)
+    for (const { canvas } of [disks, chains, marks]) g.drawImage(canvas, 0, edge, side, side)
+  }
+
+  /** Record a force that is pulled to both its ends, and save it. */
+  async film(pressed) {
+    const { textContent: words } = pressed, { wide, high } = MOVIE, canvas = createElement("canvas", { width: wide, height: high }), g = canvas.getContext("2d")
+    const host = createElement("div", { className: "hidden", style: `width: ${wide}px; height: ${wide}px` })
+    Object.assign(pressed, { disabled: true, textContent: "Recording …" })
+    pressed.after(host)
+    const pulled = await this.pulled(host), movie = await recorded(canvas, (ms) => this.frame(g, pulled, ms))
+    pulled.stop()
+    host.remove()
+    Object.assign(pressed, { disabled: false, textContent: words })
+    save(movie, `granforce-lesson.${movie.type.match(/\w+$/)}`)
+  }
+
+  /** A frame of the movie; returns whether it is the last one. */
+  frame(g, pulled, ms) {
+    const { look, chapters } = this, { wide, high, edge } = MOVIE, write = writer(g), { x, prediction } = chapters.find(({ name }) => name === PULLED)
+    const { start, reach: [least, most], network, facts: { contacts } } = pulled, up = ms < UP_MS
+    const part = eased(Math.min(1, up ? ms / UP_MS : (ms - UP_MS) / DOWN_MS))
+    pulled.drag(up ? start + part * (most - start) : most + part * (least - most))
+    pulled.show()
+    this.packing(g, pulled.canvas.scene, edge, wide)
+    write(`One of ${contacts} forces is pulled. No disk moves.`, 24, 46, look.ink, "bold 28px")
+    write(`${pulled.changesTo(network)} other forces follow.`, 24, high - 62, look.cold, "bold 32px")
+    if (ms > UP_MS + DOWN_MS) write(`How far can it go${prediction === null ? "" : `? I said ${told(x, prediction)}. And you`}? ${address(window.location)}`, 24, high - 24, look.ink, "20px")
+    return ms > UP_MS + DOWN_MS + ASKS_MS
+  }
+}
+
+/** Slow at both ends. */
+const eased = (part) => (1 - Math.cos(Math.PI * part)) / 2
+
+/** write(text, x, y, colour, size): on a canvas, in the font of the page. */
+const writer = (g) => (text, x, y, colour, size) => {
+  Object.assign(g, { fillStyle: colour, font: font(size) })
+  g.fillText(text, x, y)
 }

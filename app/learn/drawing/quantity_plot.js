@@ -14,7 +14,7 @@ function element(parent, tag, attributes = {}) {
   return child
 }
 
-/** One axis: {low, high, label, log, ticks, stops, follows: whether the other one sets its value}, and its position in pixels. */
+/** One axis: {low, high, label, log, symbol, digits: of values in words, ticks, stops, follows: whether the other one sets its value}, and its position in pixels. */
 export class Scale {
   constructor(axis, from, to) { Object.assign(this, { axis, from, to }) }
 
@@ -56,7 +56,7 @@ export class QuantityPlot {
     const inside = `inside${++plots}`, clip = { "clip-path": `url(#${inside})` }
     this.inside = element(element(svg, "clipPath", { id: inside }), "rect")
     this.exact = element(svg, "path", { class: "exact", ...clip })
-    this.further = element(svg, "path", { class: "further" })
+    this.further = element(svg, "g", { class: "further" })
     this.second = element(svg, "path", { class: "second" })
     this.seen = element(svg, "path", { class: "visited", ...clip })
     this.names = element(svg, "g", { class: "names" })
@@ -123,13 +123,13 @@ export class QuantityPlot {
 
   /**
    * state: {now: [x, y], words, marker: {value, words}, answer: {value, words}, seen, exact, dots}: seen and exact are
-   * lists of points, and so is dots; null hides a part. filled: they are areas; walk, curve: seen is a thin or a thick line.
+   * lists of points, and so is dots; null hides a part. filled: they are areas; endless: exact has no end; walk, curve: seen is a thin or a thick line.
    * second: points of a second quantity. names: [{at: [x, y], scale, words}] of curves. lines: [{value, words}], named values, the first one a bound on the others.
    */
   draw(state) {
     this.state = state
     if (!this.x) return
-    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], dots = [], second = [], filled = false, walk = false, curve = false, lines = [], names = [] } = state
+    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], endless = false, dots = [], second = [], filled = false, walk = false, curve = false, lines = [], names = [] } = state
     const path = (points, end = "") => (points.length ? `M${points.map((point) => this.place(point).map((v) => v.toFixed(1)).join()).join("L")}${end}` : "")
     for (const [part, points] of [[this.exact, exact], [this.seen, seen]]) {
       const area = filled && !((walk || curve) && points === seen)
@@ -138,7 +138,11 @@ export class QuantityPlot {
       part.classList.toggle("thin", walk && points === seen)
       part.classList.toggle("curve", curve && points === seen)
     }
-    this.further.setAttribute("d", this.beyond(exact))
+    this.further.replaceChildren()
+    for (const [x, y, up] of this.beyond(exact)) {
+      element(this.further, "path", { d: up ? `M${x} ${y - 13}l-9 14h18z` : `M${x + 13} ${y}l-14 -9v18z` })
+      if (endless) element(this.further, "text", { x: x - (up ? 24 : 4), y: y + (up ? 0 : 26), "text-anchor": "middle" }).textContent = "∞"
+    }
     this.second.setAttribute("d", second.length ? `M${second.map(([x, y]) => `${this.x.px(x)} ${this.right.px(y)}`).join("L")}h0` : "")
     this.names.replaceChildren()
     for (const { at: [x, y], words, scale } of names) element(this.names, "text", { x: this.x.px(x) + 2 * GAP, y: this[scale].px(y) - GAP }).textContent = words
@@ -161,18 +165,18 @@ export class QuantityPlot {
     }
   }
 
-  /** Heads of arrows where an area or a bar leaves the axes, on the right and at the top. */
+  /** Where an area or a bar leaves the axes, on the right and at the top: [x, y, whether at the top]. */
   beyond(points) {
-    return [this.x, this.y].map((scale, d) => {
+    return [this.x, this.y].flatMap((scale, d) => {
       const other = d ? this.x : this.y, high = scale?.axis.high
       const met = points.flatMap((b, k) => {
         const a = points.at(k - 1), part = (high - a[d]) / (b[d] - a[d]), at = a[1 - d] + part * (b[1 - d] - a[1 - d])
         return part >= 0 && part <= 1 ? [other ? Math.min(other.axis.high, Math.max(other.axis.low, at)) : at] : []
       })
-      if (!met.length || !points.some((point) => point[d] > 1.001 * high)) return ""
-      const [x, y] = this.place(d ? [(Math.min(...met) + Math.max(...met)) / 2, high] : [high, (Math.min(...met) + Math.max(...met)) / 2])
-      return d ? `M${x} ${y - 13}l-9 14h18z` : `M${x + 13} ${y}l-14 -9v18z`
-    }).join("")
+      if (!met.length || !points.some((point) => point[d] > 1.001 * high)) return []
+      const middle = (Math.min(...met) + 3 * Math.max(...met)) / 4
+      return [[...this.place(d ? [middle, high] : [high, middle]), d === 1]]
+    })
   }
 
   /** Where to write words of this half width above px, relative to it: on the plot, next to the vertical lines. */
@@ -273,7 +277,7 @@ export class QuantityPlot {
 }
 
 /** A value of the quantity on an axis, in words. */
-export const told = ({ log }, value) => (log ? String(Number(value.toPrecision(2))) : value.toFixed(2))
+export const told = ({ log, digits = 2 }, value) => (log ? String(Number(value.toPrecision(2))) : value.toFixed(digits))
 
 /** A number on an axis. */
 const name = (value) => String(Number(value.toPrecision(3))).replace("-", "−")

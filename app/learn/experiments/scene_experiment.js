@@ -2,9 +2,7 @@
 // forces.
 
 import { STILL, eased } from "../../browser/motion.js"
-import { unflat } from "../../browser/canvas_paths.js"
 import { Arrows } from "../drawing/scene_canvas.js"
-import { fixed } from "../model/middle.js"
 import { area, distance, dot, hull } from "../model/polytope.js"
 import { palette } from "../drawing/palette.js"
 import { givesWay, part, slide } from "../model/give_way.js"
@@ -15,7 +13,6 @@ import { createElement } from "../../browser/dom.js"
 const FOUND = 0.01 // relative distance from an end at which it counts as found
 const ROUND = 0.9 // part of S that a path round it has to enclose
 const ENDLESS = 100 // of the loads: how far an unbounded S is drawn, beyond all axes
-const STEPS = 20 // of a walk to other forces behind the same dot
 const GIVES = 0.2 // of the largest radius: most that bodies move at an end of S
 const SOFT = 3 // per weight: how fast they move when the hand goes past the end
 const FALL = 0.9 // s, of a body that no forces hold
@@ -39,25 +36,21 @@ export class SceneExperiment {
     this.begun = this.body.u
     this.start = this.at
     this.mean = this.body.sumAt(this.body.u) / this.body.count
-    this.ends = this.body.whole ? this.end() : source.get("ends", this.options.scene).then(({ mu, bounds, outlines }) => {
-      this.known = mu.map((one, k) => ({ mu: one, bounds: bounds[k], outline: unflat([...outlines[k]]) ?? [] }))
-      this.end()
-    })
+    if (this.body.whole) this.end()
   }
 
   get body() { return this.hand.body }
 
-  /** Whether the answer can be found: if S is not drawn whole, only the server knows it. */
+  /** Nothing, or a promise of what dragging has to wait for. */
   ready() { return this.ends }
+
+  /** Farther than any axis: where S is cut if it has no end. */
+  get far() { return ENDLESS * this.body.scaleOf() }
 
   /** S at the present friction: [least, largest] value of the quantity, and the corners on its axes. */
   measured() {
-    const { body, options: { x }, known } = this
-    if (!known) {
-      const far = ENDLESS * body.scaleOf(), ends = body.corners.flatMap(({ u }) => [u, ...body.rays.map((ray) => u.map((v, d) => v + far * ray[d]))])
-      return { bounds: body.empty ? [] : body.interval(x), outline: hull(ends.map((u) => this.flat(u))) }
-    }
-    return body.empty ? { bounds: [], outline: [] } : known.find(({ mu }) => Math.abs(mu - body.mu) < 1e-9)
+    const { body, options: { x }, far } = this, ends = body.corners.flatMap(({ u }) => [u, ...body.rays.map((ray) => u.map((v, d) => v + far * ray[d]))])
+    return { bounds: body.empty ? [] : body.interval(x), outline: hull(ends.map((u) => this.flat(u))) }
   }
 
   end() {
@@ -74,7 +67,7 @@ export class SceneExperiment {
   /** Another friction: S is cut again, and explored anew. */
   turn(mu) {
     this.hand.cut(mu)
-    Object.assign(this, { way: [], others: this.others || null, varied: mu !== this.scene.mu, past: null })
+    Object.assign(this, { way: [], varied: mu !== this.scene.mu, past: null })
     this.end()
     this.fall()
     this.changed()
@@ -175,7 +168,7 @@ export class SceneExperiment {
     const weight = [...scene.load].reduce((sum, v, k) => sum + (k % 3 === 1 ? -v : 0), 0)
     return {
       contacts: body.count, disks: scene.r.length, equations: scene.equations, free: body.h, mu: scene.mu,
-      low: this.low, high: this.high, smooth: this.smooth, weight, start: this.start[0], mean: this.mean, others: this.others,
+      low: this.low, high: this.high, smooth: this.smooth, weight, endless: !body.bounded, empty: body.empty,
     }
   }
 
@@ -201,22 +194,7 @@ export class SceneExperiment {
     for (const [px, py] of goal === "round" ? [...outline, ...ends] : ends) this.drag(px, py)
   }
 
-  /** Where S is drawn as a shadow, other forces behind the same dot. */
-  get offer() {
-    return this.body.whole || !this.answered || this.body.empty ? null : { words: "Change the other forces", run: () => this.change() }
-  }
-
-  /** Walk to another point of S with the same forces on the axes; there is none behind the edge of the shadow. */
-  change() {
-    const { body, options: { x, y } } = this, from = body.u
-    this.random ??= fixed()
-    for (let k = 0; k < STEPS; k++) body.u = body.step(body.u, this.random, [x, y])
-    this.others = Math.hypot(...body.u.map((v, d) => v - from[d])) > FOUND * body.scaleOf()
-    this.changed()
-  }
-
   moved() {
-    this.others ||= null
     this.way = hull([...(this.way.length ? this.way : [this.varied ? this.at : this.start]), this.at])
     this.answered ||= this.reached
     this.changed()
@@ -234,17 +212,20 @@ export class SceneExperiment {
   /** Part of the area of S that the path encloses. */
   get enclosed() { return area(this.way) / area(this.first.outline) }
 
+  /** An arrow is pulled: a contact, towards these forces. */
+  pulled({ contact, normal, tangential }) {
+    this.body.pull(contact, normal, tangential)
+    this.past = this.beyond(2 * contact, normal)
+    this.moved()
+  }
+
   respond(what, given) {
     if (what === "hover" && !this.arrows.held) {
       this.lit = new Set(given && !given.loose ? [given.contact] : [])
       this.changed()
     }
     if (this.locked) return what === "press"
-    if (what === "pull") {
-      this.body.pull(given.contact, given.normal, given.tangential)
-      this.past = this.beyond(2 * given.contact, given.normal)
-      this.moved()
-    }
+    if (what === "pull") this.pulled(given)
     if (what === "release") this.release()
     return false
   }
@@ -258,7 +239,7 @@ export class SceneExperiment {
     const round = goal === "round" && !this.locked && !answered ? `, ${Math.round(100 * this.enclosed)} % of S` : ""
     return {
       now: body.empty || this.hidden ? null : this.at, words: `now ${this.value.toFixed(2)}${round}`,
-      seen: way, exact: answered ? S.outline : [], filled: y !== null, unanswered: varied || goal === "both",
+      seen: way, exact: answered ? S.outline : [], endless: !body.bounded, filled: y !== null, unanswered: varied || goal === "both",
     }
   }
 

@@ -9,7 +9,7 @@ import xarray as xr
 
 from granforce.live import hulls
 from granforce.live.pulls import Puller
-from granforce.records import InputError, NotJammedError, float_array
+from granforce.records import InputError, float_array
 from granforce.study import kinds
 from granforce.study.cells import entries
 from granforce.types import Floats
@@ -29,8 +29,12 @@ FIRM = 0.5  # least critical force of the contact that is pushed, ⟨f_n⟩
 MARKED = ("grabbed", "other")  # the contacts that are pulled, as in `Packings.packing`
 STARTS = 4  # networks from which it is pushed: as packed, and others of the stored walk
 
+# The forces used as axes of S, across and up, of small scenes that are not drawn whole, as in
+# chapters.js.
+PLANES = {"thirteen": (6, 40)}
+SCENES = "ladder", "groove", "box", *PLANES
+
 BAND = np.linspace(0, 0.9999, 9)  # pushes at which S is measured, relative to the limit load
-FRICTIONS = [round(0.05 * k, 2) for k in range(25)]  # of a small scene, as its slider has them
 
 
 @lru_cache
@@ -40,21 +44,10 @@ def scene(name: str) -> dict[str, Any]:
 
 
 @lru_cache
-def ends(name: str, plane: tuple[int, int]) -> dict[str, Any]:
-    """S of a small scene on two forces at every μ of FRICTIONS; empty lists where S is empty.
-
-    mu (k,); bounds: k times [least, largest] value of the first force; outlines: corners, flat.
-    """
+def outline(name: str) -> dict[str, Any]:
+    """The outline of S of a small scene on its two forces of PLANES: corners, flat."""
     packing = small_scenes.packing_of(name)
-    bounds, outlines = [], []
-    for mu in FRICTIONS:
-        try:
-            S = small_scenes.measured(packing._replace(mu=mu), plane=plane)
-        except NotJammedError:
-            S = {"bounds": [[]] * len(packing.contacts.i), "outline": []}
-        bounds.append(S["bounds"][plane[0] // 2])
-        outlines.append(S["outline"])
-    return {"mu": FRICTIONS, "bounds": bounds, "outlines": outlines}
+    return {"outline": small_scenes.measured(packing, plane=PLANES[name])["outline"]}
 
 
 class Packings:

@@ -103,6 +103,30 @@ def test_a_walk_that_holds_two_forces_changes_the_others(run):
     assert held < 1e-9 and moved > 0.1 and least > -1e-9
 
 
+def test_a_pull_holds_two_forces_and_every_other_can_change(run):
+    held = [6, 40]
+    loose, before, after = run(
+        "learn/model/polytope",
+        """({ Body }, { scene, held }) => {
+            const body = new Body(scene).cut(scene.mu)
+            body.goInside()
+            const before = [...body.forces()]
+            body.pull(0, 2 * before[0], 0, held)
+            return [body.loose(held), before, [...body.forces()]]
+        }""",
+        scene=drawn("thirteen", 0.3),
+        held=held,
+    )
+    before, after = np.array(before), np.array(after)
+    S = gf.ensemble(gf.scene("thirteen", 0.3))
+    assert S.residual(after.reshape(-1, 2)) < 1e-6 and S.violation(after.reshape(-1, 2)) < 1e-6
+    np.testing.assert_allclose(after[held], before[held], atol=1e-3)
+    assert after[0] > before[0] + 0.1
+    directions = np.linalg.svd(np.vstack([S.A.toarray(), np.eye(len(before))[held]]))[2]
+    free = directions[-(S.dimension - 2) :]
+    assert loose == np.flatnonzero(np.abs(free).max(axis=0) > 1e-9).tolist()
+
+
 def test_a_pull_is_undone(run):
     before, pulled, after = run(
         "learn/model/scene_in_hand",
