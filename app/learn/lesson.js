@@ -144,7 +144,7 @@ class Lesson {
   /** The list of chapters, with finished ones marked, and whether the lesson is finished. */
   show() {
     const missing = CHAPTERS.filter(({ name }) => !this.progress.of(name).done).length
-    if (this.closing) Object.assign(this.next, { disabled: missing > 0, textContent: missing ? `Your predictions: ${missing} ${missing > 1 ? "chapters" : "chapter"} to go` : "Your eight predictions ▾" })
+    if (this.closing) Object.assign(this.next, { disabled: missing > 0, innerHTML: missing ? `<span>Your predictions: </span>${missing} ${missing > 1 ? "chapters" : "chapter"} to go` : "Your eight predictions ▾" })
     this.list.replaceChildren(...CHAPTERS.map(({ name, title }, k) => {
       const item = createElement("li", { className: this.progress.of(name).done ? "done" : "" }), link = item.appendChild(createElement("a", { textContent: title, href: this.address(name) }))
       if (k === this.number) {

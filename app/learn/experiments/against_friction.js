@@ -28,8 +28,6 @@ export class AgainstFriction extends SceneExperiment {
   /** The least friction for which S has no end. */
   get answer() { return this.band.find(({ bounded }) => !bounded).mu }
 
-  get range() { return [this.answer, this.answer] }
-
   get facts() { return { ...super.facts, answer: this.answer, smooth: this.band[0].low } }
 
   drag(mu, force) {

@@ -160,7 +160,7 @@ export class SceneExperiment {
   get answer() { return this.high }
 
   /** What the prediction is compared with in the end: one value, or all possible ones. */
-  get range() { return [this.options.goal === "both" ? this.low : this.high, this.high] }
+  get range() { return [this.options.goal === "both" ? this.low : this.answer, this.answer] }
 
   /** Numbers that the text needs. */
   get facts() {
