@@ -1,4 +1,4 @@
-// Numbers in a line that opens tables; one of its buttons computes the volume of S.
+// Numbers in a line that opens tables; buttons in it compute the volume of S, or more networks.
 
 import { ask } from "../browser/send.js"
 import { createElement } from "../browser/dom.js"
@@ -15,8 +15,9 @@ export function render({ model, view }) {
     }
   }
   root.addEventListener("click", ({ target }) => {
-    if (target.closest(".fold")) model.open = !model.open
-    else if (target.closest("button")) ask(model, view, { measure: true })
+    const pressed = target.closest("button")
+    if (pressed?.matches(".fold")) model.open = !model.open
+    else if (pressed) ask(model, view, { [pressed.dataset.ask]: true })
   })
   model.on(["html", "open"], show)
   show()

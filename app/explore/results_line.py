@@ -18,7 +18,7 @@ from ..widgets.hints import term
 from . import result_values
 from .result_values import Quantity
 
-MEASURE = '<button type="button" class="soft">measure</button>'
+MEASURE = '<button type="button" class="soft" data-ask="measure">measure</button>'
 GIVEN = " given the held forces"
 NONE = "", "–"  # values that are not there
 UNBOUNDED = (
@@ -26,7 +26,7 @@ UNBOUNDED = (
     "is undefined. To bound S, select such a contact and hold its force (H) or, if it is friction "
     "that wedges the grains, choose a smaller μ."
 )
-MORE = "; ask for more networks"
+MORE = '; <button type="button" class="soft" data-ask="more">take five times as many</button>'
 UNIT = {"extent": " ⟨fₙ⟩"}
 FOLD = '<button type="button" class="fold" title="all numbers, with their meaning"></button>'
 
@@ -70,6 +70,13 @@ class Results(Scripted):
         replay = self._state.replay
         if replay is not None:
             self.html = results(self._state, self._volume)
+
+    @from_browser(more=True)
+    def _more(self) -> None:
+        """Take more networks of the same S."""
+        if self._state.cell is not None:
+            selection = self._state.cell.selection
+            self._state.ask(selection._replace(states=5 * selection.states), at_once=True)
 
     @from_browser(measure=True)
     def _measure(self) -> None:
@@ -115,7 +122,7 @@ def results(state: AppState, volume: xr.Dataset | None = None) -> str:
     doubts.append(UNBOUNDED if endless else "")
     doubt = "".join(f'<p class="flag" role="note">⚠ {line}</p>' for line in filter(None, doubts))
     now, was = Shown(state.cell, state.replay, state.exact), state.before
-    change = "" if was is None else f'<p class="was">{result_values.changes(now, was)}</p>'
+    change = "" if was is None or older else f'<p class="was">{result_values.changes(now, was)}</p>'
     left = f'<p class="left">{worded(state.replay, left_out(state.replay.summary))}</p>'
     line = _laid_out(heading, measures, packing, rows, values, left, known, older)
     return line + doubt + change

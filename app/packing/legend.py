@@ -63,6 +63,7 @@ def pins(knowledge: Knowledge) -> dict[str, list[Any]]:
     return {
         "contacts": [one.contact for one in knowledge.known],
         "exact": [not one.error for one in knowledge.known],
+        "values": [one.value for one in knowledge.known],
         "words": [one.force for one in knowledge.known],
         "ranked": [] if knowledge.ranked is None else knowledge.ranked.contacts.tolist(),
     }
@@ -154,7 +155,7 @@ def colour_bar(state: AppState) -> tuple[str, list[str], str]:
         "load": ("0", list(scales["load"][::8]), _largest(state.loads, looks.full)),
         "change": change,
         "deviation": (f"≥ {FULL_DEVIATION:g} σ less", DIVERGING, f"≥ {FULL_DEVIATION:g} σ more"),
-        "known": ("0", list(scales["known"][::8]), "all of the interval"),
+        "known": ("0", list(scales["known"][::8]), _most_shortened(state)),
         "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
     }[looks.colour]
 
@@ -203,6 +204,12 @@ def _largest(loads: Floats | None, full: float | None) -> str:
     if loads is None:
         return COMING
     return f"≥ {full:.2f} ⟨fₙ⟩" if full else f"{loads.max(initial=0):.2f} ⟨fₙ⟩ (the largest)"
+
+
+def _most_shortened(state: AppState) -> str:
+    narrowed = state.knowledge.narrowed
+    most = 0.0 if narrowed is None else narrowed.shortened.max(initial=0)
+    return f"{most:.2f} ⟨fₙ⟩ (the largest of the others)"
 
 
 def jamming(state: AppState) -> str:

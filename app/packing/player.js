@@ -216,7 +216,7 @@ class Player {
 
   tellForce() {
     const { selected } = this.scene
-    if (selected !== null) this.buttons.showForce(this.replay.mixed.normal[selected])
+    if (selected !== null) this.buttons.showForce(this.pins.heldAt(selected) ?? this.replay.mixed.normal[selected])
   }
 
   /** Mark the selection, or another contact. */
@@ -361,6 +361,7 @@ class Player {
     if (this.grows || !this.scene.hand) return
     const known = this.pins.has(contact)
     if (!known && Number.isNaN(error)) return this.say(NO_ERROR, true)
+    if (!known && this.playing) this.play(false) // at a network, which has the held force
     this.tell(known ? { release: contact } : { hold: [contact, this.hand.wanted(contact) ?? mixed.normal[contact], error] })
   }
 

@@ -241,6 +241,9 @@ class Knowledge(param.Parameterized):
         self.ranking.cancel()
         if before != packing or not self.known:
             self.narrowed = None
+        looks = self.state.looks
+        if statements and not self.known and looks.colour == "known":
+            looks.colour = looks.param.colour.default
         if self.known and cell is not None and self.whole is None:
             self.compute()
         else:

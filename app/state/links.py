@@ -208,6 +208,7 @@ VIEW: dict[str, Stored] = {
     "sort": Stored(str),
     "scale": Stored(str),
     "pushing": Stored(str),
+    "sampler": Stored(str),
     "axes": Stored(str),
 }  # fmt: skip
 OF_A_REPLAY = tuple(name for name, stored in VIEW.items() if stored.numbered)

@@ -69,7 +69,8 @@ class View:
     def known(self) -> Known | None:
         """The forces that are held on the page now, for `gf.ensemble`; None if there are none.
 
-        With a warning if the page's server has ended: they are then the last ones.
+        In the packing's own unit, not in mean forces as on the page. With a warning if the page's
+        server has ended: they are then the last ones.
         """
         if self._server.poll() is not None:
             warnings.warn(f"{ENDED}; these are the last held forces", InputWarning, stacklevel=2)
@@ -99,8 +100,9 @@ def show(
 ) -> View:
     """Open the app on a packing, or on results of its ensemble; returns at once.
 
-    Packing and results are saved in the default store: the page does not compute them again. The
-    server ends with this Python process.
+    The page opens some seconds later, when its server answers. Packing and results are saved in
+    the default store: the page does not compute them again. The server ends with this Python
+    process.
 
     Parameters
     ----------

@@ -39,6 +39,8 @@ export class Look {
     const measured = plain(model.measured ?? {})
     this.measured = measured.normal?.length === walk.contacts ? measured : null
     this.reduction = model.reduction?.length === walk.contacts ? model.reduction : null // reduction of ΔFₙ by known forces
+    const known = new Set(plain(model.pins ?? {}).contacts)
+    this.mostReduced = Math.max(CARRYING, ...(this.reduction ?? []).filter((_, c) => !known.has(c)))
   }
 
   /** The kinds of the intervals, in words: exact bounds obey held forces, networks only once sampled with them. */
@@ -91,7 +93,7 @@ export class Look {
     if (colour === "mobilised") return 0.5 + (this.mobilised(c, normal[c], tangential[c]) ?? 0) / 2
     if (colour === "extent") return most > 0 ? this.extent[c] / most : 0
     if (colour === "deviation") return 0.5 + (this.measured.off[c] || 0) / (2 * this.scales.deviation)
-    if (colour === "known") return this.reduction[c] / Math.max(this.reduction[c] + this.extent[c], CARRYING)
+    if (colour === "known") return this.reduction[c] / this.mostReduced
     if (colour === "load") return this.loads[c] / this.settings.load
     if (colour === "pulled") return 0.5 + (normal[c] - this.before[c]) / (2 * this.settings.full)
     if (colour === "change") return 0.5 + (normal[c] - this.walk.normal[c]) / (2 * this.settings.full)

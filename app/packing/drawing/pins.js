@@ -21,6 +21,12 @@ export class Pins {
   /** Whether the force of a contact is known. */
   has(contact) { return [...(this.pins.contacts ?? [])].includes(contact) }
 
+  /** The force at which a contact is held; undefined if it is not. */
+  heldAt(contact) {
+    const { contacts = [], values } = this.pins
+    return values?.[contacts.indexOf(contact)]
+  }
+
   draw(context, scene) {
     const { contacts = [], exact = [], ranked = [] } = this.pins
     if (this.player.pushable && !scene.frozen) {

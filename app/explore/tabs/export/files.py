@@ -79,6 +79,7 @@ def _bounds(exact: xr.Dataset, replay: Replay, ending: str = "") -> Columns:
             value = exact[side].values[:, k] / replay.force_scale
             zero = np.abs(value) <= exact["interval_gap"].values[:, k, end]
             bounds[f"{part}_{side}{ending}"] = np.where(zero, 0.0, value)
+        bounds[f"{part}_gap{ending}"] = exact["interval_gap"].values[:, k].max(axis=-1)
     return bounds
 
 
@@ -105,6 +106,8 @@ COLUMNS = {
     "f_n_high": "largest possible normal force (exact; 0 within its duality gap)",
     "f_t_low": "least possible tangential force (exact; 0 within its duality gap)",
     "f_t_high": "largest possible tangential force (exact; 0 within its duality gap)",
+    "f_n_gap": "most that f_n_low and f_n_high can be off, as their certificates show",
+    "f_t_gap": "most that f_t_low and f_t_high can be off, as their certificates show",
 }
 
 

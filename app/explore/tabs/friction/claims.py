@@ -40,7 +40,7 @@ def summary() -> str:
     """How to read the tables."""
     marks = ", ".join(f"{mark} {words}" for words, mark in list(SYMBOLS.items())[:-1])
     return (
-        f"<b>Claims of {PAPER}</b>, by 95 % intervals: {marks}. Figures are drawn from "
+        f"<b>Claims of {PAPER}</b>, by 95 % intervals: {marks}. Figures 4 and 6 show "
         "nearest-network walks; claims are judged by what is named below each, mostly "
         f"{SAMPLERS['gauss_seidel']}."
     )

@@ -12,8 +12,9 @@ from ....results.distributions import Row
 from ....results.library import Cell
 from ....results.replays import Replay
 from ....state.app_state import AppState
+from ....state.view_settings import SAMPLERS
 from ....widgets.contact_scatter import ContactScatter
-from ....widgets.parts import TabView, folded_away, note, plotted
+from ....widgets.parts import TabView, folded_away, note, plotted, question
 from . import claims, study_figures
 from .study_figures import Correlations, Indeterminacy
 from .this_packing import extents, forces
@@ -30,6 +31,7 @@ THIS = (
     "0.15 η₃ seen by other samplers, and exact",
 )
 WIDE = {"sizing_mode": "stretch_width"}
+CHOICE: dict[str, Any] = {"width": 250, "margin": (6, 10)}
 
 
 class Rows(NamedTuple):
@@ -45,9 +47,10 @@ class View(TabView):
     name = "statistics"
 
     def __init__(self, state: AppState) -> None:
-        super().__init__(state, "replay", "exact", "catalogue")
+        super().__init__(state, "replay", "exact", "catalogue", "looks.sampler")
         self.task = state.work.task(reading)
         self.first = note("Reading and drawing Figures 1, 4 and 6 …")
+        self.sampler = question("Networks of Figure 1", SAMPLERS, self.looks, "sampler", **CHOICE)
         self.fourth, self.sixth, self.details = note(), note(), note()
         self.figures = [pn.Column(**WIDE) for _ in range(3)]
         self.folded = [pn.Column(**WIDE) for _ in THIS]
@@ -65,7 +68,7 @@ class View(TabView):
         folds = folded_away(*pairs)
         self.looks.sync_opened(folds, *(f"friction{k}" for k in range(len(THIS))))
         return pn.Column(
-            self.first, first, self.details, self.fourth, fourth, self.sixth,
+            self.first, self.sampler, first, self.details, self.fourth, fourth, self.sixth,
             sixth, folds, **WIDE,
         )  # fmt: skip
 
@@ -96,8 +99,8 @@ class View(TabView):
 
     def _show(self, replay: Replay, rows: Rows) -> Iterator[None]:
         """Draw Figure 1 first; a generator of steps."""
-        if self.indeterminacy is None:
-            self.indeterminacy = Indeterminacy()
+        if self.indeterminacy is None or self.indeterminacy.sampler != self.looks.sampler:
+            self.indeterminacy = Indeterminacy(self.looks.sampler)
             self._place(self.indeterminacy)
             self.details.object = _claims()
         self.first.object = self.indeterminacy.sentence()

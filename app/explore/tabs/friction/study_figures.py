@@ -13,6 +13,7 @@ from granforce.paper.tables import packings_at_each
 
 from ....results import distributions, study_data
 from ....results.distributions import Row
+from ....state.view_settings import SAMPLERS
 from ....widgets.hints import term
 from ....widgets.parts import figure
 from ....widgets.plot_style import DOT, legend_above
@@ -21,11 +22,8 @@ from .against_friction import COLOURS, MARKERS, AgainstFriction, Line
 
 MEASURES = (("eta1", "η₁", 1.0), ("eta2", "η₂", 1.0), ("eta3", "0.15 η₃ seen", 0.15))
 # Parts of the study, and their labels.
-SAMPLERS = {
-    "walk": "seen: nearest-network walk", "sweeps_1e-3": "seen: the paper’s walk, to 10⁻³",
-    "uniform": "seen: uniform in S", "exact": "exact",
-    "sweeps_1e-4": "seen: the paper’s walk, to 10⁻⁴",
-}  # fmt: skip
+COMPARED = {part: f"seen: {words}" for part, words in SAMPLERS.items()}
+COMPARED |= {"exact": "exact", "sweeps_1e-4": "seen: the paper’s walk, to 10⁻⁴"}
 CORRELATED = ("walk", "uniform", "exact")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
 BINS = 30
@@ -33,10 +31,11 @@ ROOM = 1.5  # of the largest η: leaves room for the inset above the rising curv
 
 
 class Indeterminacy:
-    """Figure 1: η1, η2 and 0.15 η3 against μ, with z in the inset."""
+    """Figure 1: η1, η2 and 0.15 η3 against μ, from a part of SAMPLERS, with z in the inset."""
 
-    def __init__(self) -> None:
-        walks = study_data.rows("walk")
+    def __init__(self, sampler: str) -> None:
+        self.sampler = sampler
+        self.rows = walks = study_data.in_force_space(sampler)
         self.lines = [
             Line(label, statistics.means(walks, name, factor=factor))
             for name, label, factor in MEASURES
@@ -54,38 +53,38 @@ class Indeterminacy:
         _small(self.z.figure)
 
     def mark(self, current: Row) -> None:
-        """Mark the packing on screen."""
-        self.etas.mark(current["mu"], *(factor * current[name] for name, _, factor in MEASURES))
+        """Mark the packing on screen, whose networks are those of a nearest-network walk."""
+        if self.sampler == "walk":
+            self.etas.mark(current["mu"], *(factor * current[name] for name, _, factor in MEASURES))
         self.z.mark(current["mu"], current["coordination"])
 
     def sentence(self) -> str:
         """The μ at which each η is largest, and why it falls again, as HTML."""
-        walks = study_data.rows("walk")
+        walks = self.rows
         if not len(walks):
             return "The finished study is not part of this installation."
         z = statistics.means(walks, "coordination")
         return (
-            f"<b>Maxima in nearest-network walks: {_maxima(self.lines)}.</b> Click a point to open "
-            "such a packing.<details><summary>Why a maximum?</summary>"
+            f"<b>Maxima, {SAMPLERS[self.sampler]}: {_maxima(self.lines)}.</b> Click a point to "
+            "open such a packing.<details><summary>Why a maximum?</summary>"
             "Friction widens the range of forces at each contact, but packings made with more "
             f"friction have fewer contacts: z falls from {z[0][1]:.2f} to {z[-1][1]:.2f} (inset). "
-            f"{_in_the_paper()}Points: means over {packings_at_each(walks)} packings of 400 "
+            f"{self._in_the_paper()}Points: means over {packings_at_each(walks)} packings of 400 "
             "disks, with standard errors.</details>"
         )
 
-
-def _in_the_paper() -> str:
-    """The μ of the maxima in the paper's Figure 1 and in these walks, as a sentence or nothing."""
-    peaks = study_data.maxima()
-    if not peaks:
-        return ""
-    ours = [peak["value"] for peak in peaks]
-    least, most = min(peak["low"] for peak in peaks), max(peak["high"] for peak in peaks)
-    return (
-        "In the paper's Figure 1 η also rises and falls, with its maxima near "
-        f"μ = {PAPERS_PEAK:g}; parabolas fitted to these points have them at {min(ours):.2f} to "
-        f"{max(ours):.2f} (95 %: {least:.2f} to {most:.2f}). "
-    )
+    def _in_the_paper(self) -> str:
+        """The μ of the maxima in the paper's Figure 1 and in these walks, or nothing."""
+        peaks = study_data.maxima() if self.sampler == "walk" else []
+        if not peaks:
+            return ""
+        ours = [peak["value"] for peak in peaks]
+        least, most = min(peak["low"] for peak in peaks), max(peak["high"] for peak in peaks)
+        return (
+            "In the paper's Figure 1 η also rises and falls, with its maxima near "
+            f"μ = {PAPERS_PEAK:g}; parabolas fitted to these points have them at {min(ours):.2f} "
+            f"to {max(ours):.2f} (95 %: {least:.2f} to {most:.2f}). "
+        )
 
 
 def _maxima(lines: Iterable[Line]) -> str:
@@ -106,7 +105,7 @@ def samplers(current: Row) -> Figure:
             statistics.means(study_data.in_force_space(part), "eta3", factor=0.15),
             "dashed" if part == "exact" else "solid",
         )
-        for part, label in SAMPLERS.items()
+        for part, label in COMPARED.items()
     ]
     drawn = AgainstFriction("samplers", "0.15 η₃", lines, height=280)
     drawn.mark(current["mu"], 0.15 * current["eta3"])
