@@ -17,7 +17,8 @@ export function render({ model, view }) {
   root.addEventListener("click", ({ target }) => {
     const pressed = target.closest("button")
     if (pressed?.matches(".fold")) model.open = !model.open
-    else if (pressed) ask(model, view, { [pressed.dataset.ask]: true })
+    else if (pressed?.matches(".more")) ask(model, view, { more: true })
+    else if (pressed) ask(model, view, { measure: true })
   })
   model.on(["html", "open"], show)
   show()

@@ -18,7 +18,7 @@ from ..widgets.hints import term
 from . import result_values
 from .result_values import Quantity
 
-MEASURE = '<button type="button" class="soft" data-ask="measure">measure</button>'
+MEASURE = '<button type="button" class="soft">measure</button>'
 GIVEN = " given the held forces"
 NONE = "", "–"  # values that are not there
 UNBOUNDED = (
@@ -26,7 +26,7 @@ UNBOUNDED = (
     "is undefined. To bound S, select such a contact and hold its force (H) or, if it is friction "
     "that wedges the grains, choose a smaller μ."
 )
-MORE = '; <button type="button" class="soft" data-ask="more">take five times as many</button>'
+MORE = '; <button type="button" class="soft more">take five times as many</button>'
 UNIT = {"extent": " ⟨fₙ⟩"}
 FOLD = '<button type="button" class="fold" title="all numbers, with their meaning"></button>'
 

@@ -626,6 +626,17 @@ def test_figures_of_the_paper_are_there_at_once_with_the_packing_on_screen(state
     assert list(view.indeterminacy.z.marks.data["y"]) == [row["coordination"]]
 
 
+def test_figure_1_is_drawn_from_the_networks_chosen(state):
+    view = friction_tab(state)
+    state.looks.sampler = "sweeps_1e-3"
+    wait_for(state, lambda: view.indeterminacy.sampler == "sweeps_1e-3")
+    points = statistics.means(study_data.in_force_space("sweeps_1e-3"), "eta2")
+    drawn = drawn_points(view.figures[0])
+    assert all(np.isclose(drawn, value).any() for mu, value, _ in points if mu > 0)
+    assert not len(view.indeterminacy.etas.marks.data["x"])  # the packing's networks are others
+    assert "the paper’s walk" in view.first.object and "sampler=sweeps_1e-3" in state.link()
+
+
 def test_what_is_said_of_friction_is_made_from_the_study(state):
     view = friction_tab(state)
     for name, words in (("eta1", "η₁"), ("eta2", "η₂"), ("eta3", "0.15 η₃ seen")):
@@ -643,7 +654,7 @@ def test_what_is_said_of_friction_is_made_from_the_study(state):
     assert sorted(shown) == sorted(claim["id"] for claim in every)  # each once
     ((most, _),) = Counter(claim["sampler"] for claim in every).most_common(1)
     judged = f"judged by what is named below each, mostly {SAMPLERS[most]}."
-    assert judged in told and "drawn from nearest-network walks" in told
+    assert judged in told and "show nearest-network walks" in told
     pushed = len(study_data.claims(2))
     assert told.count("<tr><td>") == len(every) - pushed > 20
 

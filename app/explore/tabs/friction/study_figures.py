@@ -170,7 +170,7 @@ class Correlations:
             part: statistics.means(study_data.rows(part), "correlation") for part in CORRELATED
         }
         lines = [
-            Line(SAMPLERS[part], points, "dashed" if part == "exact" else "solid")
+            Line(COMPARED[part], points, "dashed" if part == "exact" else "solid")
             for part, points in self.points.items()
         ]
         self.drawn = AgainstFriction("correlation", "corr(fₙ, ΔFₙ)", lines, height=280)
