@@ -136,8 +136,8 @@ export const CHAPTERS = [
     text: ({ low, high, states }) => `By hand, the green force goes from ${two(low)} to ${two(high)}. Blue: all it can be together with a violet force, a shadow of S. Now chance walks through S in ${states} steps. Each changes all forces at random and then corrects them until all disks are in balance: a new network, one point of S.`,
     ask: "What is the largest green force that chance finds?",
     doing: ({ step }) => `Press “Walk”, or drag the slider. Each dot is ${step > 1 ? `a network, one after about every ${step} steps` : "a step"}; network 0 is the one in which the packing came to rest.`,
-    see: ({ part, share, free }) => [
-      `The walk covers ${percent(part)} of what is possible for the green force. Its dots fill ${percent(share)} of the blue area, far from the edge: to get there, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
+    see: ({ part, share, free, states }) => [
+      `The line marks the largest of all ${states} networks, which may lie between two dots. The walk covers ${percent(part)} of what is possible for the green force. Its dots fill ${percent(share)} of the blue area, far from the edge: to get there, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
       `A walk shows what is typical, not what is possible. And this is only a shadow: a part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S.`,
     ],
     x: { low: 0.5, high: 4, label: "green force (mean force = 1)" }, y: { low: 0, high: 3, label: "violet force" },

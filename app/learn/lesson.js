@@ -131,6 +131,7 @@ class Lesson {
     const { pathname } = window.location, { scene } = chapter.options
     const onwards = last ? `${SUMMARY}<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with this scene</a>` : ""
     const after = createElement("div", { className: "after", innerHTML: onwards })
+    if (scene) after.addEventListener("click", ({ target }) => { target.href = `?${new URLSearchParams({ scene, mu: this.experiment.body.mu })}` })
     Object.assign(this, { next, closing: last ? new ClosingPicture(after, (host) => this.pulled(host)) : null })
     const foot = createElement("div", { className: "foot" }) // always in view, as it says what to do next
     foot.append(voice, row)

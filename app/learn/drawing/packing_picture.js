@@ -8,7 +8,7 @@ import { arrow } from "../../browser/canvas_paths.js"
 
 const WIDTH = 0.23 // of a line with the mean force, in largest radii
 const FULL = 0.5 // change in mean forces at full colour
-const ARROW = { rest: 0.8, grown: 3 } // lengths of the push in largest radii
+const ARROW = { rest: 0.8, grown: 1.6 } // lengths of the push in largest radii
 const REACH = 14 // px from a contact within which it can be dragged
 
 export class PackingPicture {
