@@ -106,25 +106,25 @@ export const CHAPTERS = [
     experiment: SceneExperiment, options: { scene: "box", x: 4, y: 0, goal: "round" },
   },
   {
-    name: "thirteen", title: "Thirteen disks", card: "Two forces held: how many of 21 others change?", heading: "Two forces are held. And the others?",
-    text: ({ contacts, equations, free, disks, mu }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations: S has ${free} dimensions. A plot shows two of them, say the green and the violet force. Now these two of the ${contacts} normal forces are held.`,
-    ask: "How many of the others can still change?",
-    doing: () => "Drag the other arrows, or press “Change the others”. The green and the violet forces stay, and so does the balance of every disk.",
-    see: (facts) => [
-      `All of them: ${facts.free - 2} of the ${facts.free} numbers are still free, and every force depends on them. The dot in the lower plot stayed: behind each of its points lie many sets of forces. The blue area is only a shadow of S, as of a body on a wall.`,
-      folded(`Where the ${facts.equations} equations come from`, tabled(counted(facts, true))),
+    name: "thirteen", title: "Thirteen disks", card: "Forces to hold at 23 contacts until none can change", heading: "When is everything fixed?",
+    text: ({ contacts, disks, mu }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. At ${contacts} contacts there are ${2 * contacts} unknown forces, and balance leaves many sets of them. Now hold one normal force at its value, then another, and so on.`,
+    ask: "How many must you hold until none of the others can change?",
+    doing: () => "Click an arrow: its force is held (magenta), and all others that still can change jump. Grey ones can change no more.",
+    see: ({ contacts, free, equations }) => [
+      `${free} numbers fix all ${2 * contacts} forces: S has ${free} dimensions. That is what the count gives, ${2 * contacts} unknown forces minus ${equations} equations, which other ${free} you hold does not matter.`,
+      `No screen can show ${free} dimensions. A plot of two forces is only a shadow of S, as of a body on a wall: behind each of its points lie many sets of forces.`,
     ],
-    live: true,
-    x: { low: 0, high: 21, digits: 0, label: "other normal forces that can change" }, y: null,
-    experiment: HeldForces, options: { scene: "thirteen", x: 6, y: 40, axes: { x: { low: 0, high: 7, label: "green force" }, y: { low: 0, high: 4, label: "violet force" } } },
+    count: (facts) => counted(facts, true),
+    x: { low: 0, high: 23, digits: 0, label: "normal forces that are held" }, y: null,
+    experiment: HeldForces, options: { scene: "thirteen", x: 6, y: 40 },
   },
   {
     name: "four-hundred", title: "Four hundred disks", card: "Largest force at one contact of 400 disks (mean = 1)", heading: "Grab one force",
-    text: ({ all, disks, mu, start, contacts, free }) => `${all} disks at μ = ${mu}; ${all - disks} faint ones carry nothing. Lines join disks in contact, thicker for larger forces. As before, 2 × ${contacts} forces − (3 × ${disks} − 1) equations = ${free} free numbers: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean.`,
+    text: ({ all, disks, mu, start, contacts, free }) => `The ${all} disks of the beginning, with numbers: μ = ${mu}; ${all - disks} faint ones carry nothing. As before, 2 × ${contacts} forces − (3 × ${disks} − 1) equations = ${free} free numbers: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean.`,
     ask: "How large can you make this force while no disk moves?",
     doing: () => "Drag the dot to the right, or the marked line upwards. Other lines follow: orange ones grow, blue ones shrink. Dots: about to slip; rings: about to open.",
     see: ({ high, opened, sliding, bare, changed, contacts, free }) => [
-      `There, ${opened} contacts are open (rings), and friction is at its limit at ${sliding} (dots): no number is free any more. ${changed} other forces have changed by more than a tenth of the mean force; a photograph would look the same.`,
+      `There, ${opened} contacts are open (rings), and friction is at its limit at ${sliding} (dots): no number is free any more. ${changed} other forces have changed by more than a tenth of the mean force; in a photograph nothing would differ.`,
       `How is ${two(high)} found? S has flat sides, and the largest value of a force is at a corner, as for the box of chapter 3 (small plot). Finding it is called a linear program: a computer does it for all ${2 * contacts} forces in well under a second.`,
       folded("How forces at their limits use up the free numbers", fixed(opened, sliding, bare, free)) + PROGRAM,
     ],
@@ -166,16 +166,16 @@ export const CHAPTERS = [
   },
   {
     name: "push", title: "Why it matters", card: "Largest push before a disk moves (mean force = 1)", heading: "When does something move?",
-    text: ({ mu }) => `The packing of chapter 5, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, step by step. Many points of S would balance the push; history picks one: each step starts from the last forces and changes them as little as it can.`,
-    verdict: ({ limits: [first, ...others] }) => ({ answer: `It is ${two(first)}${others.length ? `; ${listed(others.map(two))} from other forces` : ""}.`, so: "" }),
+    text: ({ mu }) => `The packing of chapter 5, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, step by step. Many points of S would balance the push. Each step starts from the last forces and changes them as little as balance allows, as contacts that stick keep what they have.`,
+    verdict: ({ limits: [first, ...others] }) => ({ answer: `It is ${two(first)}${others.length ? `; ${listed(others.map(two))} from other forces` : ""}.` }),
     ask: "How hard can you push before a disk moves?",
     doing: () => "Drag the dot to the right, or an arrow away from the marked line. Blue dots: about to slip.",
     see: ({ high, number, opened, slid, carried, moving, pushed, sinking, limit }) => [
-      moving ? `Disks start to move (arrows): ${opened} contacts open (rings), ${slid} slip (dots). ${sinking ? "The upper disk, pushed up, sinks, but the lower one faster" : "The gap in the pair opens"}.`
+      moving ? `Disks start to move (arrows): ${opened} contacts open (rings), ${slid} slip (dots). ${sinking ? "Both disks sink, the lower one faster, so that the gap opens" : "The gap in the pair opens"}.`
         : pushed ? `Without a push, the two disks press on each other with ${two(carried)}.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
       ...(pushed ? [`A contact that slips stays at its friction limit, and the others have to balance the rest. At ${two(high)} (end of the line) they no longer can.`] : []),
-      `Other forces in S (blue) would balance a push up to ${two(limit)}, the limit load, but sliding disks do not search for them. So statics alone promises too much, here ${percent(limit / high - 1)}, and limits of slopes and foundations are often computed from statics.`,
+      `Other forces in S (blue) would balance a push up to ${two(limit)}, the limit load, but sliding disks do not search for them. So statics alone promises too much${pushed ? `, here ${percent(limit / high - 1)}` : ""}, and limits of slopes and foundations are often computed from statics.`,
     ],
     x: { low: 0, high: 2, label: "push (mean force = 1)" }, y: { low: 0, high: 1.5, label: "force of the line", follows: true },
     experiment: Push, options: {},

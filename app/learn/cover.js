@@ -45,7 +45,7 @@ export class Cover {
     const verdict = createElement("p", { className: "verdict" })
     verdict.append(createElement("b", { textContent: `${experiment.changesTo(network)} other forces follow.` }), createElement("span", { textContent: `of ${facts.contacts - 1}, by more than a tenth of the mean force. No disk moves.` }))
     voice.replaceChildren(verdict)
-    if (this.far) voice.append(createElement("p", { textContent: "Pull other lines, too: every disk stays in balance. How can that be, and which forces are the real ones? A ladder, one disk, two disks, thirteen: then you will know." }))
+    if (this.far) voice.append(createElement("p", { textContent: "Pull other lines, too: every disk stays in balance. How can that be? A ladder, one disk, two disks, thirteen: then you will know." }))
     this.drawn()
   }
 }

@@ -8,7 +8,7 @@ import { plain } from "../browser/send.js"
 import { CHAPTERS, SUMMARY } from "./chapters.js"
 import { COVER, Cover } from "./cover.js"
 import { palette } from "./drawing/palette.js"
-import { ClosingPicture } from "./drawing/closing_picture.js"
+import { ClosingPicture, DARED } from "./drawing/closing_picture.js"
 import { Grab } from "./experiments/grab.js"
 import { PredictDoSee } from "./predict_do_see.js"
 import { Progress } from "./progress.js"
@@ -16,7 +16,7 @@ import { Source } from "./source.js"
 
 // The data of later chapters, requested one after the other while the first is read, as some take
 // time.
-const AHEAD = [["scene", "ladder"], ["scene", "groove"], ["scene", "box"], ["scene", "thirteen"], ["outline", "thirteen"], ["packing", "0.1"], ["rail", "grabbed"], ["shadow"], ["push", "0"], ["curve"], ["push", "1"]]
+const AHEAD = [["scene", "ladder"], ["scene", "groove"], ["scene", "box"], ["scene", "thirteen"], ["packing", "0.1"], ["rail", "grabbed"], ["shadow"], ["push", "0"], ["curve"], ["push", "1"]]
 
 class Lesson {
   constructor(model, view) {
@@ -62,6 +62,12 @@ class Lesson {
     return `?${query}`
   }
 
+  /** A chapter, with a friend's prediction if the address has one. */
+  dared(chapter) {
+    const said = new URLSearchParams(window.location.search).get("said"), value = Number(said)
+    return chapter.name === DARED && said && value >= chapter.x.low && value <= chapter.x.high ? { ...chapter, said: value } : chapter
+  }
+
   go(number) {
     window.history.pushState(null, "", this.address(CHAPTERS[number].name))
     this.open(number)
@@ -71,7 +77,7 @@ class Lesson {
 
   async open(number) {
     this.close()
-    const chapter = CHAPTERS[number] ?? COVER, turn = ++this.openings
+    const chapter = this.dared(CHAPTERS[number] ?? COVER), turn = ++this.openings
     this.number = number
     keepChapter(chapter.name)
     const parts = this.lay(chapter)
@@ -90,6 +96,7 @@ class Lesson {
     const { stops } = experiment, x = stops ? { ...chapter.x, stops, ticks: stops.filter(isDecade) } : chapter.x
     parts.text.innerHTML = chapter.text(experiment.facts)
     parts.text.append(" ", createElement("strong", { textContent: chapter.ask }))
+    if (chapter.said) parts.text.append(createElement("em", { textContent: "A friend’s prediction is shown after yours." }))
     const save = (more) => { this.progress.set(chapter.name, more); this.show() }
     const again = () => { save({ prediction: null, done: false }); this.open(number) }
     const drawn = () => this.paint()

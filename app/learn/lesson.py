@@ -64,8 +64,6 @@ class Lesson(Scripted):
             case "scene" if name in lesson_data.SCENES:
                 pool = computing if EVERY[name].packed else reading
                 self._send("scene", name, lambda: lesson_data.scene(name), pool)
-            case "outline" if name in lesson_data.PLANES:
-                self._send("outline", name, lambda: lesson_data.outline(name), computing)
             case "packing":
                 mu = by_friction.get(name, float("nan"))
                 self._send("packing", name, lambda: packings.packing(mu))

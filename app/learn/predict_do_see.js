@@ -151,10 +151,11 @@ export class PredictDoSee {
 
   /** The answer next to the prediction, or, once something else has been varied, what then holds; with its reason, the surprise and more. */
   answer(headline, sentences) {
-    const { chapter: { verdict: judged }, experiment, prediction } = this
+    const { chapter, experiment, prediction } = this
     const verdict = createElement("p", { className: "verdict" })
-    const is = judged?.(experiment.facts, prediction) ?? { answer: `It is ${this.named(experiment.answer)}.`, so: this.judged }
-    const said = headline ? [headline, ` ${experiment.before}`] : [is.answer, ` You predicted ${this.named(prediction)}${is.so}.`]
+    const is = chapter.verdict?.(experiment.facts, prediction) ?? { answer: `It is ${this.named(experiment.answer)}.` }
+    const friend = chapter.said ? ` Your friend: ${this.named(chapter.said)}.` : ""
+    const said = headline ? [headline, ` ${experiment.before}`] : [is.answer, ` You predicted ${this.named(prediction)}${is.so ?? this.judged}.${friend}`]
     verdict.append(...["b", "span"].map((tag, k) => createElement(tag, { textContent: said[k] })))
     return [verdict, ...sentences.map((innerHTML) => createElement("p", { innerHTML }))]
   }

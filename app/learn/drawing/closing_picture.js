@@ -1,6 +1,7 @@
 // The end of the lesson: all predictions beside the answers, as a picture to keep, and a movie of a force that is pulled.
 
 import { circle, font, line } from "../../browser/canvas_paths.js"
+import { copyButton } from "../../browser/clipboard.js"
 import { createElement, button } from "../../browser/dom.js"
 import { save } from "../../browser/download.js"
 import { recorded } from "../../browser/movie.js"
@@ -8,10 +9,10 @@ import { Scale, told } from "./quantity_plot.js"
 
 const WIDE = 1200, HIGH = 630 // px, as links are previewed
 const RAIL = { left: 670, right: 990, top: 186, step: 54 } // of the predictions
-const TITLE = ["How far can forces go", "while nothing moves?"]
+const TITLE = ["How far can forces go?", "What I said, and what is possible"]
 const MOVIE = { wide: 720, high: 900, edge: 72 } // px; edge: above the packing
 const UP_MS = 4000, DOWN_MS = 4000, ASKS_MS = 3000 // of the movie: the force grows, falls, and a question ends it
-const PULLED = "four-hundred" // the chapter of the force in the movie
+export const DARED = "four-hundred" // the chapter of the force in the movie, and of the challenge
 
 /** The answer of a chapter in words: one value, or both ends. */
 const answered = ({ x, answer }) => [...new Set(answer.map((value) => told(x, value)))].join(" to ")
@@ -20,20 +21,28 @@ const answered = ({ x, answer }) => [...new Set(answer.map((value) => told(x, va
 const address = ({ host, hostname, pathname }) => (hostname === "localhost" ? "granforce: forces in packings of disks" : `${host}${pathname}?learn`)
 
 export class ClosingPicture {
-  /** pulled(host): a promise of the experiment of PULLED, drawn in this element. */
+  /** pulled(host): a promise of the experiment of DARED, drawn in this element. */
   constructor(host, pulled) {
     this.pulled = pulled
     const canvas = this.canvas = createElement("canvas", { width: WIDE, height: HIGH, role: "img" })
     const keep = () => canvas.toBlob((blob) => save(blob, "granforce-lesson.png"))
-    host.prepend(canvas, button("Save as a movie", (pressed) => this.film(pressed)), " ", button("Save as a picture", keep))
+    host.prepend(canvas, button("Save as a movie", (pressed) => this.film(pressed)), " ", button("Save as a picture", keep), " ", copyButton("Copy a challenge for a friend", () => this.challenge))
   }
+
+  /** A link that asks the same question, and tells the prediction after the reader's own. */
+  get challenge() {
+    const { origin, pathname } = window.location, { prediction } = this.dared
+    return `${origin}${pathname}?learn=${DARED}${prediction === null ? "" : `&said=${prediction.toFixed(2)}`}`
+  }
+
+  get dared() { return this.chapters.find(({ name }) => name === DARED) }
 
   /** scene: the packing on screen; chapters: [{name, card, x: axis, prediction, answer: [low, high]}]; look: as from palette. */
   draw(scene, chapters, look) {
     Object.assign(this, { chapters, look })
     const g = this.canvas.getContext("2d"), { left, right, top, step } = RAIL, write = writer(g), place = (x, value) => new Scale(x, left, right).px(Math.min(x.high, Math.max(x.low, value)))
     this.packing(g, scene, 0, HIGH)
-    TITLE.forEach((words, k) => write(words, left, 56 + 38 * k, look.ink, "bold 32px"))
+    TITLE.forEach((words, k) => write(words, left, 56 + 38 * k, look.ink, k ? "20px" : "bold 32px"))
     write("○ my prediction", left, 136, look.hand, "17px")
     write("● the answer", left + 160, 136, look.cold, "17px")
     chapters.forEach((chapter, k) => {
@@ -78,7 +87,7 @@ export class ClosingPicture {
 
   /** A frame of the movie; returns whether it is the last one. */
   frame(g, pulled, ms) {
-    const { look, chapters } = this, { wide, high, edge } = MOVIE, write = writer(g), { x, prediction } = chapters.find(({ name }) => name === PULLED)
+    const { look, dared: { x, prediction } } = this, { wide, high, edge } = MOVIE, write = writer(g)
     const { start, reach: [least, most], network, facts: { contacts } } = pulled, up = ms < UP_MS
     const part = eased(Math.min(1, up ? ms / UP_MS : (ms - UP_MS) / DOWN_MS))
     pulled.drag(up ? start + part * (most - start) : most + part * (least - most))
@@ -86,7 +95,7 @@ export class ClosingPicture {
     this.packing(g, pulled.canvas.scene, edge, wide)
     write(`One of ${contacts} forces is pulled. No disk moves.`, 24, 46, look.ink, "bold 28px")
     write(`${pulled.changesTo(network)} other forces follow.`, 24, high - 62, look.cold, "bold 32px")
-    if (ms > UP_MS + DOWN_MS) write(`How far can it go${prediction === null ? "" : `? I said ${told(x, prediction)}. And you`}? ${address(window.location)}`, 24, high - 24, look.ink, "20px")
+    if (ms > UP_MS + DOWN_MS) write(`How far can it go${prediction === null ? "" : `? I said ${told(x, prediction)} times the mean. And you`}? ${address(window.location)}`, 24, high - 24, look.ink, "20px")
     return ms > UP_MS + DOWN_MS + ASKS_MS
   }
 }

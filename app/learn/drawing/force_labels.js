@@ -4,13 +4,14 @@ import { font } from "../../browser/canvas_paths.js"
 import { distance } from "../model/polytope.js"
 import { number } from "../model/sentences.js"
 
-const NAMED = 30 // px: least distance of a foot from the weight
+const NAMED = 12 // px: least distance of a foot from the weight
 const SMALL = 300 // px: height of a drawing in which values have no names
 export const ASIDE = 9 // px between friction and the wall that would cover it
 
-/** Values next to the forces used as axes of S, on the side of each with more room. */
+/** Values next to the forces used as axes of S, two at most, on the side of each with more room. */
 export function drawValues(arrows, F) {
   const { context: g, body, look } = arrows
+  if (look.axes?.size > 2) return
   g.font = font("bold 12px")
   g.textAlign = "center"
   g.textBaseline = "middle"

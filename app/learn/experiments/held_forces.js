@@ -1,64 +1,59 @@
-// A small scene of many dimensions: two of its forces are held, the others are dragged or change at random.
+// A small scene of many dimensions: its normal forces are held, one after the other, until none can change.
 
-import { unflat } from "../../browser/canvas_paths.js"
 import { fixed } from "../model/middle.js"
 import { SceneExperiment } from "./scene_experiment.js"
 
 const STEPS = 20 // of a walk to other forces
-const CHANGED = 0.01 // of the mean force
-const MOST = 50 // walks, after which every force that can change has
 
 export class HeldForces extends SceneExperiment {
-  others = new Set() // that have changed
-
-  async load(source) {
-    await super.load(source)
-    Object.assign(this, { steered: false, random: fixed(), packed: this.body.forces() })
-    this.ends = source.get("outline", this.options.scene).then(({ outline }) => { this.outline = unflat([...outline]) })
-  }
+  steered = false
+  held = [] // forces, as in Body.interval
+  note = ""
+  random = fixed()
 
   get knob() { return null }
 
   get headline() { return "" }
 
-  /** Forces on the axes of the shadow, which are held. */
-  get held() { return [this.options.x, this.options.y] }
+  get edge() { return this.note }
 
-  get at() { return [this.others.size, 0] }
+  get at() { return [this.held.length, 0] }
 
-  /** Number of other normal forces that depend on the numbers that are still free. */
-  get answer() { return this.body.loose(this.held).filter((index) => index % 2 === 0).length }
+  /** Each held force fixes one free number. */
+  get answer() { return this.body.h }
 
-  get offer() { return { words: "Change the others", run: () => this.change() } }
+  /** Normal forces that can still change. */
+  get loose() { return this.body.loose(this.held).filter((index) => index % 2 === 0) }
 
-  /** Walk to another point of S with the same held forces. */
-  change() {
-    const { body, random, held } = this
-    for (let k = 0; k < STEPS; k++) body.u = body.step(body.u, random, held)
-    this.moved()
+  get offer() {
+    const [next] = this.loose
+    return next === undefined ? null : { words: "Hold another force", run: () => this.hold(next) }
   }
 
-  pulled({ contact, normal, tangential }) {
-    this.body.pull(contact, normal, tangential, this.held)
-    this.moved()
+  respond(what, given) {
+    const target = what === "press" && given.target
+    if (target && !target.loose && !this.locked) this.hold(2 * target.contact)
+    return super.respond(what === "pull" ? "press" : what, given) || Boolean(target)
   }
 
-  moved() {
-    const { body, packed, held, others, mean } = this
-    body.forces().forEach((v, index) => {
-      if (index % 2 === 0 && !held.includes(index) && Math.abs(v - packed[index]) > CHANGED * mean) others.add(index)
-    })
-    this.answered ||= others.size >= this.answer
+  /** Hold a force at its value if it can still change; all that can change do. */
+  hold(index) {
+    const { body, random, loose } = this
+    this.note = this.held.includes(index) ? "this force is held" : loose.includes(index) ? "" : "the held forces fix this one"
+    if (!this.note) {
+      this.held = [...this.held, index]
+      for (let k = 0; k < STEPS; k++) body.u = body.step(body.u, random, this.held)
+      this.answered ||= !this.loose.length
+    }
     this.changed()
   }
 
-  finish() { for (let k = 0; k < MOST && !this.answered; k++) this.change() }
+  finish() { while (this.loose.length) this.hold(this.loose[0]) }
 
-  get picture() { return { now: this.at, words: `changed: ${this.others.size}` } }
-
-  /** The shadow of S, with the dot that stayed. */
-  get aside() {
-    const { options: { axes }, outline, body, held } = this, F = body.forces()
-    return { axes, exact: outline, filled: true, now: held.map((index) => F[index]) }
+  coloured({ hand, weight }) {
+    const { loose, held, body: { count } } = this, normal = Array.from({ length: count }, (_, c) => 2 * c)
+    return new Map([...normal.filter((index) => !loose.includes(index)).map((index) => [index, weight]), ...held.map((index) => [index, hand])])
   }
+
+  get picture() { return { now: this.at, words: `held: ${this.held.length}, can change: ${this.loose.length}` } }
 }

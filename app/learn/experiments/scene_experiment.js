@@ -243,9 +243,15 @@ export class SceneExperiment {
     }
   }
 
+  /** Colours of forces: of those on the axes of the plot. */
+  coloured({ across, up }) {
+    const { x, y } = this.options
+    return new Map(y === null ? [] : [[x, across], [y, up]])
+  }
+
   /** Draw the forces on their way to the point of S; returns whether they have not arrived. */
   draw(dark) {
-    const { arrows, hand, canvas, options: { x, y } } = this
+    const { arrows, hand, canvas } = this
     if (!hand || !canvas.clientWidth) return false
     const { body } = hand, { u } = body
     if (arrows.body !== body || arrows.wide !== canvas.clientWidth) {
@@ -255,7 +261,7 @@ export class SceneExperiment {
     }
     body.u = this.shown = eased(this.shown, u)
     this.label.textContent = this.edge
-    const colours = palette(dark), axes = new Map(y === null ? [] : [[x, colours.across], [y, colours.up]]), { poses, pushed, moves } = this.motion
+    const colours = palette(dark), axes = this.coloured(colours), { poses, pushed, moves } = this.motion
     arrows.draw({ ...colours, axes, contacts: this.lit, contact: null, disk: null, fall: null, unnamed: this.hidden, places: 2, poses, pushed })
     body.u = u
     return this.shown !== u || moves

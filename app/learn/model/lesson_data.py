@@ -29,10 +29,7 @@ FIRM = 0.5  # least critical force of the contact that is pushed, ⟨f_n⟩
 MARKED = ("grabbed", "other")  # the contacts that are pulled, as in `Packings.packing`
 STARTS = 4  # networks from which it is pushed: as packed, and others of the stored walk
 
-# The forces used as axes of S, across and up, of small scenes that are not drawn whole, as in
-# chapters.js.
-PLANES = {"thirteen": (6, 40)}
-SCENES = "ladder", "groove", "box", *PLANES
+SCENES = "ladder", "groove", "box", "thirteen"
 
 BAND = np.linspace(0, 0.9999, 9)  # pushes at which S is measured, relative to the limit load
 
@@ -41,13 +38,6 @@ BAND = np.linspace(0, 0.9999, 9)  # pushes at which S is measured, relative to t
 def scene(name: str) -> dict[str, Any]:
     """A small scene as from `small_scenes.drawn`; cached."""
     return small_scenes.drawn(name)
-
-
-@lru_cache
-def outline(name: str) -> dict[str, Any]:
-    """The outline of S of a small scene on its two forces of PLANES: corners, flat."""
-    packing = small_scenes.packing_of(name)
-    return {"outline": small_scenes.measured(packing, plane=PLANES[name])["outline"]}
 
 
 class Packings:

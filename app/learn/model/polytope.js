@@ -3,7 +3,6 @@
 
 const FAR = [1e4, 1e8] // bounds added to an apparently unbounded S, to find rays along which it is unbounded
 const SMALL = 1e-9
-const HELD = 1e5 // weight of held forces in the metric of a pull
 const STEERED = 12 // most projections onto S during dragging
 export const OPENS = 0 // f_n = 0; 1 and −1: f_t = μ f_n and −μ f_n
 
@@ -340,12 +339,11 @@ export class Body {
     return [...this.origin.keys()].filter((index) => free.some((way) => Math.abs(dot(way, this.axes.map((axis) => axis[index]))) > SMALL))
   }
 
-  /** Pull the force of a contact towards (f_n, f_t), changing all others as little as possible, and these not at all. */
-  pull(contact, normal, tangential, held = []) {
+  /** Pull the force of a contact towards (f_n, f_t), changing all others as little as possible. */
+  pull(contact, normal, tangential) {
     const B = [2 * contact, 2 * contact + 1].map((index) => this.axes.map((axis) => axis[index]))
     const now = this.forces(), miss = [normal - now[2 * contact], tangential - now[2 * contact + 1]]
-    const rows = held.map((force) => this.axes.map((axis) => axis[force]))
-    const H = this.u.map((_, a) => this.u.map((_, b) => B[0][a] * B[0][b] + B[1][a] * B[1][b] + (a === b ? 1e-3 : 0) + rows.reduce((sum, row) => sum + HELD * row[a] * row[b], 0)))
+    const H = this.u.map((_, a) => this.u.map((_, b) => B[0][a] * B[0][b] + B[1][a] * B[1][b] + (a === b ? 1e-3 : 0)))
     const inverse = H.map((_, k) => solve(H, H.map((_, l) => (l === k ? 1 : 0))))
     if (inverse.some((column) => !column)) return false
     const gain = this.u.map((_, a) => B[0][a] * miss[0] + B[1][a] * miss[1])

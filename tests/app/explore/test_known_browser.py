@@ -1,6 +1,7 @@
 """In a browser: forces are held, intervals shrink, stresses."""
 
-from serving import MODEL, column, expect, painted, picture, scene
+import pytest
+from serving import MODEL, column, expect, painted, picture, scene, until
 
 
 def select(page, contact):
@@ -28,9 +29,14 @@ def span(page, name):
 def test_held_forces_are_pinned_narrow_the_rest_and_survive_a_reload(visit):
     page = visit()
     select(page, 4)
+    page.keyboard.press("Space")
+    until(page, "scene.hand.player.playing")
     page.keyboard.press("h")
     chips(page, 1)
-    assert scene(page, "scene.hand.player.pins.has(4)")
+    assert not scene(page, "scene.hand.player.playing")  # it rests at a network with this force
+    held = scene(page, "scene.hand.player.pins.heldAt(4)")
+    assert float(page.locator("input.force").input_value()) == pytest.approx(held, abs=6e-4)
+    assert scene(page, "scene.mixed.normal[4]") == pytest.approx(held, abs=1e-6)
     whole = f"{MODEL}('bars')?.get_column('whole_low')"
     page.wait_for_function(f"() => {whole}?.every(Number.isFinite)")
     assert span(page, "exact") < 0.99 * span(page, "whole")
