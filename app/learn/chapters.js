@@ -111,7 +111,7 @@ export const CHAPTERS = [
     ask: "How many must you hold until none of the others can change?",
     doing: () => "Click an arrow: its force is held (magenta), and all others that still can change jump. Grey ones can change no more.",
     see: ({ contacts, free, equations }) => [
-      `${free} numbers fix all ${2 * contacts} forces: S has ${free} dimensions. That is what the count gives, ${2 * contacts} unknown forces minus ${equations} equations, which other ${free} you hold does not matter.`,
+      `${free} numbers fix all ${2 * contacts} forces: S has ${free} dimensions. That is what the count gives, ${2 * contacts} unknown forces minus ${equations} equations, whichever you hold.`,
       `No screen can show ${free} dimensions. A plot of two forces is only a shadow of S, as of a body on a wall: behind each of its points lie many sets of forces.`,
     ],
     count: (facts) => counted(facts, true),

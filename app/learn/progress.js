@@ -1,6 +1,6 @@
 // The reader's progress: predictions and finished chapters, stored in this browser.
 
-const KEY = "granforce.learn"
+const KEY = "granforce.predictions"
 
 export class Progress {
   constructor() {
