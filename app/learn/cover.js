@@ -32,18 +32,18 @@ export class Cover {
 
   /** Give the marked line a force: this part of the way from the least to the largest. */
   pull(part) {
-    const [low, high] = this.experiment.reach
+    const { low, high } = this.experiment.facts
     this.experiment.drag(low + part * (high - low))
   }
 
   show() {
-    const { experiment, voice, next, slider } = this, { value, start, network, facts } = experiment, [low, high] = experiment.reach
+    const { experiment, voice, next, slider } = this, { value, start, network, facts: { low, high, contacts } } = experiment
     this.far ||= value > start ? value - start > FAR * (high - start) : start - value > FAR * (start - low)
     slider.value = STEPS * (value - low) / (high - low)
     next.className = this.far ? "primary" : ""
     if (value === start) return this.drawn()
     const verdict = createElement("p", { className: "verdict" })
-    verdict.append(createElement("b", { textContent: `${experiment.changesTo(network)} other forces follow.` }), createElement("span", { textContent: `of ${facts.contacts - 1}, by more than a tenth of the mean force. No disk moves.` }))
+    verdict.append(createElement("b", { textContent: `${experiment.changesTo(network)} other forces follow.` }), createElement("span", { textContent: `of ${contacts - 1}, by more than a tenth of the mean force. No disk moves.` }))
     voice.replaceChildren(verdict)
     if (this.far) voice.append(createElement("p", { textContent: "Pull other lines, too: every disk stays in balance. How can that be? A ladder, one disk, two disks, thirteen: then you will know." }))
     this.drawn()

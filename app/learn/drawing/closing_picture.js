@@ -88,9 +88,9 @@ export class ClosingPicture {
   /** A frame of the movie; returns whether it is the last one. */
   frame(g, pulled, ms) {
     const { look, dared: { x, prediction } } = this, { wide, high, edge } = MOVIE, write = writer(g)
-    const { start, reach: [least, most], network, facts: { contacts } } = pulled, up = ms < UP_MS
+    const { start, network, facts: { low, high: most, contacts } } = pulled, up = ms < UP_MS
     const part = eased(Math.min(1, up ? ms / UP_MS : (ms - UP_MS) / DOWN_MS))
-    pulled.drag(up ? start + part * (most - start) : most + part * (least - most))
+    pulled.drag(up ? start + part * (most - start) : most + part * (low - most))
     pulled.show()
     this.packing(g, pulled.canvas.scene, edge, wide)
     write(`One of ${contacts} forces is pulled. No disk moves.`, 24, 46, look.ink, "bold 28px")

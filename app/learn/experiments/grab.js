@@ -34,9 +34,6 @@ export class Grab extends PackingExperiment {
     return { ...this.counted(packing), start: this.start, low: packing.least[contact], high: packing.largest[contact], changed: this.changesTo(this.first?.normal.subarray(-packing.contacts) ?? []), ...this.atEnd }
   }
 
-  /** The least and the largest value of the marked line that its rail reaches. */
-  get reach() { return [this.rail.values[0], this.rail.values.at(-1)] }
-
   /** A promise: dragging has to wait for the first rail. */
   ready() { return this.fetched }
 

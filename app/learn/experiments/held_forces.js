@@ -31,9 +31,10 @@ export class HeldForces extends SceneExperiment {
   }
 
   respond(what, given) {
-    const target = what === "press" && given.target
+    if (what !== "press") return super.respond(what, given)
+    const { target } = given
     if (target && !target.loose && !this.locked) this.hold(2 * target.contact)
-    return super.respond(what === "pull" ? "press" : what, given) || Boolean(target)
+    return true // nothing is dragged
   }
 
   /** Hold a force at its value if it can still change; all that can change do. */
