@@ -84,6 +84,7 @@ export class Arrows {
   carried(disk, [x, y]) {
     const [dx, dy, turn] = this.look?.poses?.[disk] ?? []
     if (dx === undefined) return [x, y]
+    if (!this.body.scene.outlines[disk]?.length) return [x + dx, y + dy] // disks roll off their contacts
     const { scene } = this.body, [a, b] = [x - scene.x[2 * disk], y - scene.x[2 * disk + 1]], [c, s] = [Math.cos(turn), Math.sin(turn)]
     return [x - a + c * a - s * b + dx, y - b + s * a + c * b + dy]
   }
