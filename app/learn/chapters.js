@@ -70,7 +70,7 @@ export const CHAPTERS = [
     doing: () => "Drag the dot to both ends, and past them, or drag an arrow. Wherever you stop in between, the ladder is in balance.",
     verdict: ({ low, high }, prediction) => ({
       answer: `Anything from ${two(low)} to ${two(high)}.`,
-      so: prediction < low || prediction > high ? ", which is not among them" : ": possible, like all the others",
+      so: +two(prediction) < +two(low) || +two(prediction) > +two(high) ? ", which is not among them" : ": possible, like all the others",
     }),
     see: ({ low, high, smooth, endless }) => [
       `At ${two(low)} the wall’s friction holds the ladder up as hard as it can; at ${two(high)} it pulls it down. Textbooks make the wall smooth and keep the floor rough: only ${two(smooth)} is left. (The slider changes both.)`,
@@ -136,8 +136,8 @@ export const CHAPTERS = [
     text: ({ low, high, states }) => `By hand, the green force goes from ${two(low)} to ${two(high)}. Blue: all it can be together with a violet force, a shadow of S. Now chance walks through S in ${states} steps. Each changes all forces at random and then corrects them until all disks are in balance: a new network, one point of S.`,
     ask: "What is the largest green force that chance finds?",
     doing: ({ step }) => `Press “Walk”, or drag the slider. Each dot is ${step > 1 ? `a network, one after about every ${step} steps` : "a step"}; network 0 is the one in which the packing came to rest.`,
-    see: ({ part, share, free, states }) => [
-      `The line marks the largest of all ${states} networks, which may lie between two dots. The walk covers ${percent(part)} of what is possible for the green force. Its dots fill ${percent(share)} of the blue area, far from the edge: to get there, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
+    see: ({ part, share, free, states, step }) => [
+      `${step > 1 ? `The line marks the largest of all ${states} networks, here between two dots. ` : ""}The walk covers ${percent(part)} of what is possible for the green force. Its dots fill ${percent(share)} of the blue area, far from the edge: to get there, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
       `A walk shows what is typical, not what is possible. And this is only a shadow: a part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S.`,
     ],
     x: { low: 0.5, high: 4, label: "green force (mean force = 1)" }, y: { low: 0, high: 3, label: "violet force" },
@@ -167,11 +167,11 @@ export const CHAPTERS = [
   {
     name: "push", title: "Why it matters", card: "Largest push before a disk moves (mean force = 1)", heading: "When does something move?",
     text: ({ mu }) => `The packing of chapter 5, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, step by step. Many points of S would balance the push. Each step starts from the last forces and changes them as little as balance allows, as contacts that stick keep what they have.`,
-    verdict: ({ limits: [first, ...others] }) => ({ answer: `It is ${two(first)}${others.length ? `; ${listed(others.map(two))} from other forces` : ""}.` }),
+    verdict: ({ limits: [first, ...others] }) => ({ answer: `It is ${two(first)}${others.length ? `; ${listed(others.map(two))} from other forces` : ""}.`, so: others.length ? "" : undefined }),
     ask: "How hard can you push before a disk moves?",
     doing: () => "Drag the dot to the right, or an arrow away from the marked line. Blue dots: about to slip.",
     see: ({ high, number, opened, slid, carried, moving, pushed, sinking, limit }) => [
-      moving ? `Disks start to move (arrows): ${opened} contacts open (rings), ${slid} slip (dots). ${sinking ? "Both disks sink, the lower one faster, so that the gap opens" : "The gap in the pair opens"}.`
+      moving ? `Disks start to move (arrows): ${opened} contacts open (rings), ${slid} slip (dots). ${sinking ? "Both disks move down, the lower one faster, so that the gap opens" : "The gap in the pair opens"}.`
         : pushed ? `Without a push, the two disks press on each other with ${two(carried)}.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
       ...(pushed ? [`A contact that slips stays at its friction limit, and the others have to balance the rest. At ${two(high)} (end of the line) they no longer can.`] : []),

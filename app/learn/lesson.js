@@ -1,6 +1,7 @@
 // Learn: eight chapters, one on screen; the chapter and the reader's progress are in the address
 // and in the browser.
 
+import { copyButton } from "../browser/clipboard.js"
 import { button, createElement } from "../browser/dom.js"
 import { keepChapter } from "../browser/local_storage.js"
 import { STILL } from "../browser/motion.js"
@@ -66,6 +67,12 @@ class Lesson {
   dared(chapter) {
     const said = new URLSearchParams(window.location.search).get("said"), value = Number(said)
     return chapter.name === DARED && said && value >= chapter.x.low && value <= chapter.x.high ? { ...chapter, said: value } : chapter
+  }
+
+  /** A link that asks a friend the same, and tells the prediction after the friend's own. */
+  get challenge() {
+    const { origin, pathname } = window.location
+    return `${origin}${pathname}?learn=${DARED}&said=${this.progress.of(DARED).prediction?.toFixed(2) ?? ""}`
   }
 
   go(number) {
@@ -138,6 +145,7 @@ class Lesson {
     const { pathname } = window.location, { scene } = chapter.options
     const onwards = last ? `${SUMMARY}<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with this scene</a>` : ""
     const after = createElement("div", { className: "after", innerHTML: onwards })
+    if (last || chapter.name === DARED) after.append(copyButton("Challenge a friend: copy the link", () => this.challenge))
     if (scene) after.addEventListener("click", ({ target }) => { target.href = `?${new URLSearchParams({ scene, mu: this.experiment.body.mu })}` })
     Object.assign(this, { next, closing: last ? new ClosingPicture(after, (host) => this.pulled(host)) : null })
     const foot = createElement("div", { className: "foot" }) // always in view, as it says what to do next

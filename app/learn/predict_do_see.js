@@ -95,7 +95,8 @@ export class PredictDoSee {
     const words = picture.words ?? `now ${this.named(experiment.value)}`
     const guess = { value: prediction ?? this.waiting, words: prediction === null ? "your prediction: ?" : `your prediction: ${this.named(prediction)}` }
     const answer = stage === 2 && !picture.unanswered ? { value: experiment.answer, words: this.named(experiment.answer) } : null
-    this.plot.draw({ ...picture, words, marker: guess, answer })
+    const friend = stage === 2 && this.chapter.said ? [{ value: this.chapter.said, words: "your friend" }] : []
+    this.plot.draw({ ...picture, words, marker: guess, answer, lines: [...picture.lines ?? [], ...friend] })
     this.plot.allow(!stage ? "marker" : this.ready && experiment.steered ? "dot" : null)
     this.button.hidden = stage > 0
     this.button.disabled = prediction === null
@@ -149,12 +150,18 @@ export class PredictDoSee {
     return `, ${x.log ? "" : `${told(x, Math.abs(off))} `}too ${off > 0 ? "low" : "high"}`
   }
 
+  /** Who of two was closer to the answer. */
+  get closer() {
+    const { chapter: { said }, prediction, experiment: { answer } } = this, by = Math.abs(said - answer) - Math.abs(prediction - answer)
+    return Math.abs(by) < 0.005 ? "a draw" : by > 0 ? "you were closer" : "your friend was closer"
+  }
+
   /** The answer next to the prediction, or, once something else has been varied, what then holds; with its reason, the surprise and more. */
   answer(headline, sentences) {
     const { chapter, experiment, prediction } = this
     const verdict = createElement("p", { className: "verdict" })
     const is = chapter.verdict?.(experiment.facts, prediction) ?? { answer: `It is ${this.named(experiment.answer)}.` }
-    const friend = chapter.said ? ` Your friend: ${this.named(chapter.said)}.` : ""
+    const friend = chapter.said ? ` Your friend: ${this.named(chapter.said)}; ${this.closer}.` : ""
     const said = headline ? [headline, ` ${experiment.before}`] : [is.answer, ` You predicted ${this.named(prediction)}${is.so ?? this.judged}.${friend}`]
     verdict.append(...["b", "span"].map((tag, k) => createElement(tag, { textContent: said[k] })))
     return [verdict, ...sentences.map((innerHTML) => createElement("p", { innerHTML }))]

@@ -1,7 +1,6 @@
 // The end of the lesson: all predictions beside the answers, as a picture to keep, and a movie of a force that is pulled.
 
 import { circle, font, line } from "../../browser/canvas_paths.js"
-import { copyButton } from "../../browser/clipboard.js"
 import { createElement, button } from "../../browser/dom.js"
 import { save } from "../../browser/download.js"
 import { recorded } from "../../browser/movie.js"
@@ -26,16 +25,8 @@ export class ClosingPicture {
     this.pulled = pulled
     const canvas = this.canvas = createElement("canvas", { width: WIDE, height: HIGH, role: "img" })
     const keep = () => canvas.toBlob((blob) => save(blob, "granforce-lesson.png"))
-    host.prepend(canvas, button("Save as a movie", (pressed) => this.film(pressed)), " ", button("Save as a picture", keep), " ", copyButton("Copy a challenge for a friend", () => this.challenge))
+    host.prepend(canvas, button("Save as a movie", (pressed) => this.film(pressed)), " ", button("Save as a picture", keep))
   }
-
-  /** A link that asks the same question, and tells the prediction after the reader's own. */
-  get challenge() {
-    const { origin, pathname } = window.location, { prediction } = this.dared
-    return `${origin}${pathname}?learn=${DARED}${prediction === null ? "" : `&said=${prediction.toFixed(2)}`}`
-  }
-
-  get dared() { return this.chapters.find(({ name }) => name === DARED) }
 
   /** scene: the packing on screen; chapters: [{name, card, x: axis, prediction, answer: [low, high]}]; look: as from palette. */
   draw(scene, chapters, look) {
@@ -87,7 +78,7 @@ export class ClosingPicture {
 
   /** A frame of the movie; returns whether it is the last one. */
   frame(g, pulled, ms) {
-    const { look, dared: { x, prediction } } = this, { wide, high, edge } = MOVIE, write = writer(g)
+    const { look, chapters } = this, { x, prediction } = chapters.find(({ name }) => name === DARED), { wide, high, edge } = MOVIE, write = writer(g)
     const { start, network, facts: { low, high: most, contacts } } = pulled, up = ms < UP_MS
     const part = eased(Math.min(1, up ? ms / UP_MS : (ms - UP_MS) / DOWN_MS))
     pulled.drag(up ? start + part * (most - start) : most + part * (low - most))

@@ -1,4 +1,4 @@
-"""The volume of S among the results: offered, measured in the background, found again."""
+"""Buttons among the results: the volume of S, measured in the background, and more networks."""
 
 import pytest
 from visitor import wait_for
@@ -30,3 +30,11 @@ def test_it_is_that_of_the_packing_on_screen(state, results):
     wait_for(state)
     # One network only: nothing to measure.
     assert "measure</button>" not in results.html and "h free dimensions" in results.html
+
+
+def test_too_few_networks_offer_more_of_them(state, results):
+    assert "take five times as many</button>" in results.html
+    before = state.cell.selection.states
+    results.hear({"more": True})
+    wait_for(state)
+    assert state.cell.selection.states == 5 * before

@@ -56,6 +56,7 @@ def test_a_force_in_single_precision_is_held_as_it_is_read(state):
 def test_colour_and_width_show_what_measuring_took_away(state):
     player = Player(state)
     assert player.reduction is None
+    state.looks.colour = "known"
     state.knowledge.hold(4, float(state.replay.normal[0, 4]))
     state.knowledge.hold(9, float(state.replay.normal[0, 9]), 0.02)
     wait_for(state)
@@ -63,10 +64,12 @@ def test_colour_and_width_show_what_measuring_took_away(state):
     assert player.reduction == pytest.approx(np.maximum(before - after, 0), abs=1e-5)
     assert player.reduction[4] == pytest.approx(before[4], abs=1e-4)  # held: all of it
     assert player.reduction[9] > before[9] - 0.04 - 1e-4  # at most the error bar is left
+    others = np.delete(before - after, [4, 9])
+    assert f"{others.max():.2f} ⟨fₙ⟩ (the largest of the others)" in player.legend
     state.knowledge.release(4)
     state.knowledge.release(9)
     wait_for(state)
-    assert player.reduction is None
+    assert player.reduction is None and state.looks.colour == "change"
 
 
 def test_what_carries_for_certain_is_counted_by_certified_bounds(state):
