@@ -123,10 +123,10 @@ export const CHAPTERS = [
     text: ({ all, disks, mu, start, contacts, free }) => `The ${all} disks of the beginning, with numbers: μ = ${mu}; ${all - disks} faint ones carry nothing. As before, 2 × ${contacts} forces − (3 × ${disks} − 1) equations = ${free} free numbers: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean.`,
     ask: "How large can you make this force while no disk moves?",
     doing: () => "Drag the dot to the right, or the marked line upwards. Other lines follow: orange ones grow, blue ones shrink. Dots: about to slip; rings: about to open.",
-    see: ({ high, opened, sliding, bare, changed, contacts, free }) => [
-      `There, ${opened} contacts are open (rings), and friction is at its limit at ${sliding} (dots): no number is free any more. ${changed} other forces have changed by more than a tenth of the mean force; in a photograph nothing would differ.`,
+    see: ({ high, opened, sliding, bare, changed, contacts, free }, full = fixed(opened, sliding, bare, free)) => [
+      `There, ${opened} contacts are open (rings), and friction is at its limit at ${sliding} (dots)${full ? ": no number is free any more" : ""}. ${changed} other forces have changed by more than a tenth of the mean force; in a photograph nothing would differ.`,
       `How is ${two(high)} found? S has flat sides, and the largest value of a force is at a corner, as for the box of chapter 3 (small plot). Finding it is called a linear program: a computer does it for all ${2 * contacts} forces in well under a second.`,
-      folded("How forces at their limits use up the free numbers", fixed(opened, sliding, bare, free)) + PROGRAM,
+      folded("How forces at their limits use up the free numbers", full) + PROGRAM,
     ],
     x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: null,
     experiment: Grab, options: { marked: "grabbed", across: 4, up: 0, axes: { x: { low: 1, high: 4, label: "box of chapter 3: normal force at the floor" }, y: { low: 0, high: 5, label: "between the disks" } } },
