@@ -116,7 +116,7 @@ export const CHAPTERS = [
     ],
     count: (facts) => counted(facts, true),
     x: { low: 0, high: 23, digits: 0, label: "normal forces that are held" }, y: null,
-    experiment: HeldForces, options: { scene: "thirteen", x: 6, y: 40 },
+    experiment: HeldForces, options: { scene: "thirteen" },
   },
   {
     name: "four-hundred", title: "Four hundred disks", card: "Largest force at one contact of 400 disks (mean = 1)", heading: "Grab one force",

@@ -35,14 +35,10 @@ export class SceneExperiment {
     this.hand = new SceneInHand(scene, () => {})
     this.begun = this.body.u
     this.start = this.at
-    this.mean = this.body.sumAt(this.body.u) / this.body.count
     if (this.body.whole) this.end()
   }
 
   get body() { return this.hand.body }
-
-  /** Nothing, or a promise of what dragging has to wait for. */
-  ready() { return this.ends }
 
   /** Farther than any axis: where S is cut if it has no end. */
   get far() { return ENDLESS * this.body.scaleOf() }
