@@ -77,7 +77,9 @@ def test_a_narrow_page_and_its_help_have_no_serious_finding(visit):
     assert findings(page) == []
 
 
-@pytest.mark.parametrize("query", ["?learn=ladder", "?learn=box", "?scene=box", "?scene=own"])
+@pytest.mark.parametrize(
+    "query", ["?learn", "?learn=thirteen", "?learn=box", "?scene=box", "?scene=own"]
+)
 def test_no_chapter_or_scene_has_a_serious_finding(opening, query):
     page = opening(query, 390, 900)
     whole = page.locator(".course, .bench")
