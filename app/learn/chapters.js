@@ -58,9 +58,10 @@ function counted({ contacts, disks, equations, free }, pressed) {
 }
 
 /**
- * Each chapter: name in links; title in the list; heading; text and ask, shown first; doing(facts), the instruction
- * for dragging; see(facts): reason, surprise and more, as HTML; verdict(facts, prediction): in place of "It is …"; card: the question in the last picture; count(facts):
- * the rows of a sum, live during dragging if `live`; x, y, second: axes; experiment with options.
+ * Each chapter: name in links; title in the list; card: the question in the last picture; heading; text and ask, shown first;
+ * doing(facts), the instruction for dragging; see(facts): reason, surprise and more, as HTML; verdict(facts, prediction): {answer, so},
+ * in place of "It is …" and of how far the prediction is off; count(facts): the rows of a sum, live during dragging if `live`;
+ * x, y, second: axes; experiment with options.
  */
 export const CHAPTERS = [
   {
@@ -106,7 +107,7 @@ export const CHAPTERS = [
     experiment: SceneExperiment, options: { scene: "box", x: 4, y: 0, goal: "round" },
   },
   {
-    name: "thirteen", title: "Thirteen disks", card: "Forces to hold at 23 contacts until none can change", heading: "When is everything fixed?",
+    name: "thirteen", title: "Thirteen disks", card: "Forces to hold until no other can change", heading: "When is everything fixed?",
     text: ({ contacts, disks, mu }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. At ${contacts} contacts there are ${2 * contacts} unknown forces, and balance leaves many sets of them. Now hold one normal force at its value, then another, and so on.`,
     ask: "How many must you hold until none of the others can change?",
     doing: () => "Click an arrow: its force is held (magenta), and all others that still can change jump. Grey ones can change no more.",
@@ -119,7 +120,7 @@ export const CHAPTERS = [
     experiment: HeldForces, options: { scene: "thirteen" },
   },
   {
-    name: "four-hundred", title: "Four hundred disks", card: "Largest force at one contact of 400 disks (mean = 1)", heading: "Grab one force",
+    name: "four-hundred", title: "Four hundred disks", card: "Largest force at the marked contact (mean = 1)", heading: "Grab one force",
     text: ({ all, disks, mu, start, contacts, free }) => `The ${all} disks of the beginning, with numbers: μ = ${mu}; ${all - disks} faint ones carry nothing. As before, 2 × ${contacts} forces − (3 × ${disks} − 1) equations = ${free} free numbers: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean.`,
     ask: "How large can you make this force while no disk moves?",
     doing: () => "Drag the dot to the right, or the marked line upwards. Other lines follow: orange ones grow, blue ones shrink. Dots: about to slip; rings: about to open.",
@@ -132,7 +133,7 @@ export const CHAPTERS = [
     experiment: Grab, options: { marked: "grabbed", across: 4, up: 0, axes: { x: { low: 1, high: 4, label: "box of chapter 3: normal force at the floor" }, y: { low: 0, high: 5, label: "between the disks" } } },
   },
   {
-    name: "chance", title: "A random walk", card: "Largest force that 1000 random steps find", heading: "How far does chance go?",
+    name: "chance", title: "A random walk", card: "Largest force that a random walk finds (mean = 1)", heading: "How far does chance go?",
     text: ({ low, high, states }) => `By hand, the green force goes from ${two(low)} to ${two(high)}. Blue: all it can be together with a violet force, a shadow of S. Now chance walks through S in ${states} steps. Each changes all forces at random and then corrects them until all disks are in balance: a new network, one point of S.`,
     ask: "What is the largest green force that chance finds?",
     doing: ({ step }) => `Press “Walk”, or drag the slider. Each dot is ${step > 1 ? `a network, one after about every ${step} steps` : "a step"}; network 0 is the one in which the packing came to rest.`,

@@ -5,6 +5,7 @@ import { copyButton } from "../browser/clipboard.js"
 import { button, createElement } from "../browser/dom.js"
 import { keepChapter } from "../browser/local_storage.js"
 import { STILL } from "../browser/motion.js"
+import { sceneQuery } from "../browser/scene_options.js"
 import { plain } from "../browser/send.js"
 import { CHAPTERS, SUMMARY } from "./chapters.js"
 import { COVER, Cover } from "./cover.js"
@@ -95,6 +96,7 @@ class Lesson {
     try {
       await experiment.load(source)
     } catch (error) {
+      if (chapter === COVER && turn === this.openings) return this.open(0) // which needs no stored packing
       parts.voice.textContent = error.message
       return
     }
@@ -115,10 +117,8 @@ class Lesson {
 
   /** The experiment of chapter 5, for a movie. */
   async pulled(host) {
-    const { source, model } = this, palettes = () => plain(model.palettes)
-    const grab = new Grab(host, { marked: "grabbed", plain: true }, () => {}, palettes())
-    grab.show = () => grab.draw(model.dark, palettes())
-    await grab.load(source)
+    const grab = new Grab(host, { marked: "grabbed", plain: true }, () => {}, plain(this.model.palettes))
+    await grab.load(this.source)
     await grab.ready()
     return grab
   }
@@ -135,9 +135,7 @@ class Lesson {
     voice.textContent = "Loading … The first time on a server, this can take a minute."
     const [picture, plot] = ["picture", "plot"].map((className) => createElement("figure", { className }))
     const knob = createElement("label", { className: "knob", hidden: true }), row = createElement("div", { className: "row" }), turn = createElement("span", { className: "turn" })
-    const next = last ? button("", () => {
-      after.scrollIntoView({ behavior: STILL.matches ? "auto" : "smooth" })
-    })
+    const next = last ? button("", () => after.scrollIntoView({ behavior: STILL.matches ? "auto" : "smooth" }))
       : button("", () => this.go(number + 1), { innerHTML: `Next<span>: ${CHAPTERS[number + 1].title}</span> ▸` })
     if (number >= 0) turn.append(button("◂", () => this.go(number - 1), { ariaLabel: "Back" }))
     turn.append(next)
@@ -146,7 +144,7 @@ class Lesson {
     const onwards = last ? `${SUMMARY}<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with this scene</a>` : ""
     const after = createElement("div", { className: "after", innerHTML: onwards })
     if (last || chapter.name === DARED) after.append(copyButton("Challenge a friend: copy the link", () => this.challenge))
-    if (scene) after.addEventListener("click", ({ target }) => { target.href = `?${new URLSearchParams({ scene, mu: this.experiment.body.mu })}` })
+    if (scene) after.firstChild.addEventListener("click", ({ currentTarget }) => { currentTarget.href = sceneQuery(scene, this.experiment.body.mu) })
     Object.assign(this, { next, closing: last ? new ClosingPicture(after, (host) => this.pulled(host)) : null })
     const foot = createElement("div", { className: "foot" }) // always in view, as it says what to do next
     foot.append(voice, row)

@@ -80,9 +80,9 @@ export class ClosingPicture {
   frame(g, pulled, ms) {
     const { look, chapters } = this, { x, prediction } = chapters.find(({ name }) => name === DARED), { wide, high, edge } = MOVIE, write = writer(g)
     const { start, network, facts: { low, high: most, contacts } } = pulled, up = ms < UP_MS
-    const part = eased(Math.min(1, up ? ms / UP_MS : (ms - UP_MS) / DOWN_MS))
+    const part = gently(Math.min(1, up ? ms / UP_MS : (ms - UP_MS) / DOWN_MS))
     pulled.drag(up ? start + part * (most - start) : most + part * (low - most))
-    pulled.show()
+    pulled.draw(null, pulled.palettes)
     this.packing(g, pulled.canvas.scene, edge, wide)
     write(`One of ${contacts} forces is pulled. No disk moves.`, 24, 46, look.ink, "bold 28px")
     write(`${pulled.changesTo(network)} other forces follow.`, 24, high - 62, look.cold, "bold 32px")
@@ -92,7 +92,7 @@ export class ClosingPicture {
 }
 
 /** Slow at both ends. */
-const eased = (part) => (1 - Math.cos(Math.PI * part)) / 2
+const gently = (part) => (1 - Math.cos(Math.PI * part)) / 2
 
 /** write(text, x, y, colour, size): on a canvas, in the font of the page. */
 const writer = (g) => (text, x, y, colour, size) => {

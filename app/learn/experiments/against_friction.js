@@ -28,13 +28,18 @@ export class AgainstFriction extends SceneExperiment {
   /** The least friction for which S has no end. */
   get answer() { return this.band.find(({ bounded }) => !bounded).mu }
 
-  get facts() { return { ...super.facts, answer: this.answer, smooth: this.band[0].low } }
+  get facts() { return { ...super.facts, answer: this.answer } }
 
   drag(mu, force) {
-    const { hand, body, options: { x, most }, visited: [low, high] } = this
+    const { hand, body, options: { x, most } } = this
     hand.cut(Math.min(most, Math.max(0, STEP * Math.round(mu / STEP))))
     body.steer([x], [force])
     this.past = this.beyond(x, force)
+    this.moved()
+  }
+
+  moved() {
+    const [low, high] = this.visited
     this.visited = [Math.min(low, this.mu), Math.max(high, this.mu)]
     this.answered ||= this.mu >= this.answer
     this.changed()

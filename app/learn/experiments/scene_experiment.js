@@ -21,7 +21,7 @@ const FRICTION = { label: "friction μ", max: 1.2, step: 0.05, stage: 2 }
 export class SceneExperiment {
   /**
    * options: {scene, x, y}: forces on the axes, 2 c for the normal one of contact c; y null for a line. goal: where the dot
-   * has to go: to "both" ends, "round" S, or by default to the largest value.
+   * has to go: to "both" ends or "round" S.
    */
   constructor(host, options, changed) {
     Object.assign(this, { host, options, changed, steered: true, locked: true, answered: false, lit: new Set(), way: [] })
@@ -81,7 +81,7 @@ export class SceneExperiment {
 
   /** S at another friction, in words. */
   get headline() {
-    const { varied, scene, body, S: { bounds: [low, high] = [] } = {} } = this, mu = this.friction
+    const { varied, scene, body, S: { bounds: [low, high] } } = this, mu = this.friction
     if (!varied) return ""
     if (low === undefined) return `${mu}: nothing holds ${scene.r.length > 1 ? "them" : "it"}, S is empty.`
     if (!body.bounded) return `${mu}: S has no end.`
@@ -93,7 +93,7 @@ export class SceneExperiment {
   /** What is about to slip or to open where the dot is, at the edge of S, in words. */
   get edge() {
     const { body } = this, met = ({ slope, rest }) => Math.abs(dot(slope, body.u) + rest) < 1e-6 * body.scaleOf()
-    if (this.locked || !body.whole || body.empty || body.corners.length < 2) return ""
+    if (this.locked || body.empty || body.corners.length < 2) return ""
     const stops = body.rows.filter(met).map(({ contact, what }) => [contact, what])
     return this.past ? `with ${this.past.sign > 0 ? "more" : "less"}, the ${this.bodies} would move` : stopping(body, { stops })
   }
@@ -107,7 +107,7 @@ export class SceneExperiment {
   beyond(index, value) {
     const { body, scene } = this, contact = index >> 1
     if (scene.j[contact] < scene.r.length) return null // between two disks
-    const [low, high] = body.whole && !body.empty ? body.interval(index) : [], sign = value > high ? 1 : value < low ? -1 : 0
+    const [low, high] = body.empty ? [] : body.interval(index), sign = value > high ? 1 : value < low ? -1 : 0
     if (!sign) return null
     body.goToEnd(index, sign)
     const motion = givesWay(body, contact, sign), far = Math.abs(value - (sign > 0 ? high : low)) / body.scaleOf()
@@ -198,11 +198,9 @@ export class SceneExperiment {
 
   /** Whether the dot has been where it has to go. */
   get reached() {
-    const { way, options: { goal }, first } = this
-    if (!first) return false
-    const [low, high] = first.bounds, near = FOUND * (high - low), xs = way.map(([x]) => x)
-    if (goal === "round") return this.enclosed > ROUND
-    return high - Math.max(...xs) < near && (goal !== "both" || Math.min(...xs) - low < near)
+    if (this.options.goal === "round") return this.enclosed > ROUND
+    const { low, high } = this, near = FOUND * (high - low), xs = this.way.map(([x]) => x)
+    return high - Math.max(...xs) < near && Math.min(...xs) - low < near
   }
 
   /** Part of the area of S that the path encloses. */

@@ -4,6 +4,11 @@ import re
 
 import pytest
 from serving import chain, expect, scene, serve, until
+from small_store import cell_parameters
+
+from granforce.study import cells as study
+from granforce.study import kinds
+from granforce.study.store import open_store
 
 WORDS = 70  # at most, before the hand acts
 # Name of each chapter: its heading; keys that carry the dot to the answer; the answer.
@@ -240,6 +245,15 @@ def test_a_prediction_is_not_moved_by_a_grasp_and_stays_within_the_possible(open
     page.mouse.move(x - 500, y)
     page.mouse.up()
     assert float(marker.get_attribute("aria-valuenow")) == pytest.approx(start, abs=1e-6)
+
+
+def test_without_a_stored_packing_the_lesson_begins_with_the_ladder(opening, tmp_path):
+    shipped = tmp_path / "start.zarr"
+    study.get(open_store(shipped), kinds.WALK, cell_parameters(1.0), dtypes={"states": "float32"})
+    with serve(tmp_path, GRANFORCE_DATA=str(shipped)) as (url, _):
+        page = opening("?learn", 1280, 900, first=True, at=url)
+        page.get_by_role("heading", name="Which will it be?").wait_for()
+        page.locator("article strong").wait_for()
 
 
 def test_eight_held_forces_fix_all(opening, lesson):

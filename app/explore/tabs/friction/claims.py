@@ -3,20 +3,17 @@
 import html
 import re
 
+from granforce.paper.claims import groups
 from granforce.paper.claims.table import TOPICS
 from granforce.paper.claims.verdicts import SYMBOLS
 from granforce.paper.documents import UNBROKEN, case_texts, preparation_note
 
 from ....results import study_data
+from ....state.view_settings import SAMPLERS as words
 
 # Samplers by whose numbers claims are judged.
-SAMPLERS = {
-    "gauss_seidel": "the paper’s walk, to 10⁻³",
-    "nearest": "nearest-network walk",
-    "uniform": "uniform in S",
-    "exact": "exact",
-    "": "packings",
-}
+SAMPLERS = {name: words[part] for name, part in groups.SAMPLERS.items() if part in words}
+SAMPLERS |= {"exact": "exact", "": "packings"}
 PAPER = "Shaebani, Unger, Kertész, PRE 79, 052302 (2009)"
 HEAD = "<tr><th>claim</th><th>verdict</th><th>cases</th><th>others</th></tr>"
 TABLE = "<div class='judged'><table class='claims'>{}</table></div>"
