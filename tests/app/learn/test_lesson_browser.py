@@ -254,6 +254,7 @@ def test_without_a_stored_packing_the_lesson_begins_with_the_ladder(opening, tmp
         page = opening("?learn", 1280, 900, first=True, at=url)
         page.get_by_role("heading", name="Which will it be?").wait_for()
         page.locator("article strong").wait_for()
+        page.close()  # before its server ends
 
 
 def test_eight_held_forces_fix_all(opening, lesson):
