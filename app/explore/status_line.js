@@ -59,6 +59,6 @@ function invitation() {
   const paragraph = createElement("p", { className: "new" })
   const link = createElement("a", { href: "?learn", textContent: "Learn" })
   const close = button("×", () => { remember(NEW); paragraph.remove() }, { ariaLabel: "Close permanently" })
-  paragraph.append("New to this? ", link, " starts with a ladder", close)
+  paragraph.append("New to this? ", link, " starts with one force", close)
   return paragraph
 }

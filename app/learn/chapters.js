@@ -24,21 +24,11 @@ const PRESSED = [
 
 const tabled = (rows) => `<table>${rows.map((row) => `<tr>${row.map((cell) => `<td>${cell}</td>`).join("")}</tr>`).join("")}</table>`
 
-/** Text that a reader may open; nothing if there is none. */
-const folded = (title, html) => (html ? `<details><summary>${title}</summary>${html}</details>` : "")
-
-/** Contacts at their limits against free numbers, in words; nothing if fewer forces are fixed than numbers were free. */
-function fixed(opened, sliding, bare, free) {
-  const forces = 2 * opened + sliding, known = 3 * bare
-  const rest = known ? `${known} of them replace the equations of ${bare > 1 ? `${bare} disks` : "the disk"} left without contacts; the other ${forces - known}` : "They"
-  return forces - known < free ? "" : `An open contact fixes two forces, a sliding one fixes one: 2 × ${opened} + ${sliding} = ${forces}. ${rest} use up all ${free} free numbers.`
-}
-
 /** The largest force in a groove of two walls at 45° as a linear program, folded. */
-const PROGRAM = folded("A linear program, written out: the groove of chapter 2", tabled([
+const PROGRAM = `<details><summary>A linear program, written out: the disk in the groove</summary>${tabled([
   ["largest", "N₁"], ["no net force sideways", "N₁ − T₁ = N₂ − T₂"], ["none up or down", "N₁ + T₁ + N₂ + T₂ = √2 × weight"], ["no turning", "T₁ = T₂"],
   ["friction is limited (T: up along the wall)", "−μN₁ ≤ T₁ ≤ μN₁, −μN₂ ≤ T₂ ≤ μN₂"], ["walls only press", "N₁ ≥ 0, N₂ ≥ 0"], ["the corner found, for μ = 0.5", "N₁ = N₂ = 1.41, T₁ = T₂ = −0.71"],
-]))
+])}</details>`
 
 export const SUMMARY = `<ul>
   <li><b>S</b>: all sets of forces that hold the same disks.</li>
@@ -46,6 +36,13 @@ export const SUMMARY = `<ul>
   <li><b>Walk</b>: what is typical. <b>Linear program</b>: what is possible.</li>
   <li><b>More friction</b>: first S is wider, then it loses dimensions.</li>
   <li><b>Limit load</b>: S ends. Disks move before.</li></ul>`
+
+/** What to try next: the query of a page, its name, and a question. */
+export const ONWARDS = [
+  ["?scene=arch", "An arch of stones", "From which friction on does it stand?"],
+  ["?scene=own", "Build your own", "How many numbers can three disks leave free?"],
+  ["", "Explore 400 disks", "Hold one force. Which others does it bind?"],
+]
 
 /** The count of free numbers, line by line, with the sum in the last row. */
 function counted({ contacts, disks, equations, free }, pressed) {
@@ -59,11 +56,24 @@ function counted({ contacts, disks, equations, free }, pressed) {
 
 /**
  * Each chapter: name in links; title in the list; card: the question in the last picture; heading; text and ask, shown first;
- * doing(facts), the instruction for dragging; see(facts): reason, surprise and more, as HTML; verdict(facts, prediction): {answer, so},
+ * first: the instruction for predicting, if it is not the usual one; doing(facts), the instruction for dragging; see(facts): reason, surprise and more, as HTML; verdict(facts, prediction): {answer, so},
  * in place of "It is …" and of how far the prediction is off; count(facts): the rows of a sum, live during dragging if `live`;
  * x, y, second: axes; experiment with options.
  */
 export const CHAPTERS = [
+  {
+    name: "four-hundred", title: "Pull a force", card: "Largest force at the marked contact (mean = 1)", heading: "Pull one force",
+    text: ({ all, mu }) => `${all} disks with friction μ = ${mu}, pressed together from all sides. Each line is the force between two of them: the thicker, the stronger. <b>Pull the marked line upwards.</b> Others follow, orange ones grow, blue ones shrink, and every disk stays in balance.`,
+    ask: "How large can this force become while no disk moves?",
+    first: "Pull the marked line a little; then drag the marker to your prediction.",
+    doing: () => "Drag the dot to the right, or the marked line upwards, as far as it goes.",
+    see: ({ start, opened, sliding, changed, contacts }) => [
+      `It began at ${two(start)}. ${changed} of ${contacts - 1} other forces have changed by more than a tenth of the mean, and no disk has moved: a photograph would be the same. It ends where ${sliding} contacts are about to slip (dots) and ${opened} about to open (rings).`,
+      "So the packing does not tell its forces. How can that be? A ladder, one disk, two disks, thirteen: then you will know. Pull other lines, too.",
+    ],
+    x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: null,
+    experiment: Grab, options: { marked: "grabbed" },
+  },
   {
     name: "ladder", title: "A ladder", card: "A ladder’s force on the wall (its weight = 1)", heading: "Which will it be?",
     text: ({ mu }) => `A ladder of weight 1 leans against a rough wall on a rough floor: friction is at most μ = ${mu} times the normal force (blue wedges). A mechanics course solves it without friction at the wall. With it, four forces are unknown, two at each end, and there are three equations of balance.`,
@@ -98,9 +108,10 @@ export const CHAPTERS = [
     text: ({ mu }) => `Two disks of weight 1 lie in a box, with friction of at most ${mu} times each normal force. Eight unknown forces, six equations: two numbers stay free, and S is an area. The axes of the plot are two of the forces, green and violet.`,
     ask: "How large can the floor’s normal force become?",
     doing: () => "Drag the dot as far as it goes: right, up, left and down. What its path encloses turns blue: between two possible sets of forces, every mixture is possible too.",
-    see: ({ high, weight, mu, endless }) => [
-      `Both disks weigh ${weight}. The other ${two(high - weight)} comes from the walls, where friction pulls the wedged disks down. With more, the lower disk would slip on the floor: friction is at its limit there, ${mu} × ${two(high)}.`,
-      prompted({ endless }, "Every point of the polygon is one set of forces that holds the same two disks. Drag the dot along its edges: above the drawing you read what is about to slip. Then raise the friction, until S has no end here either."),
+    see: ({ high, weight, endless }) => [
+      `Both disks weigh ${weight}. The other ${two(high - weight)} comes from the walls, where friction pulls the wedged disks down. With more, the lower disk would slip on the floor.`,
+      `Like the largest value of any force, it is at a corner of S. Finding that corner is called a linear program; a computer does it for every force of 400 disks in well under a second.${PROGRAM}`,
+      prompted({ endless }, "Drag the dot along the edges: above the drawing you read what is about to slip. Then raise the friction, until S has no end here either."),
     ],
     count: (facts) => counted(facts, false),
     x: { low: 1, high: 4, label: "normal force at the floor (green)" }, y: { low: 0, high: 5, label: "between the disks (violet)" },
@@ -116,25 +127,12 @@ export const CHAPTERS = [
       `No screen can show ${free} dimensions. A plot of two forces is only a shadow of S, as of a body on a wall: behind each of its points lie many sets of forces.`,
     ],
     count: (facts) => counted(facts, true),
-    x: { low: 0, high: 23, digits: 0, label: "normal forces that are held" }, y: null,
+    x: { low: 0, high: 23, digits: 0, stops: [...Array(24).keys()], label: "normal forces that are held" }, y: null,
     experiment: HeldForces, options: { scene: "thirteen" },
   },
   {
-    name: "four-hundred", title: "Four hundred disks", card: "Largest force at the marked contact (mean = 1)", heading: "Grab one force",
-    text: ({ all, disks, mu, start, contacts, free }) => `The ${all} disks of the beginning, with numbers: μ = ${mu}; ${all - disks} faint ones carry nothing. As before, 2 × ${contacts} forces − (3 × ${disks} − 1) equations = ${free} free numbers: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean.`,
-    ask: "How large can you make this force while no disk moves?",
-    doing: () => "Drag the dot to the right, or the marked line upwards. Other lines follow: orange ones grow, blue ones shrink. Dots: about to slip; rings: about to open.",
-    see: ({ high, opened, sliding, bare, changed, contacts, free }, full = fixed(opened, sliding, bare, free)) => [
-      `There, ${opened} contacts are open (rings), and friction is at its limit at ${sliding} (dots)${full ? ": no number is free any more" : ""}. ${changed} other forces have changed by more than a tenth of the mean force; in a photograph nothing would differ.`,
-      `How is ${two(high)} found? S has flat sides, and the largest value of a force is at a corner, as for the box of chapter 3 (small plot). Finding it is called a linear program: a computer does it for all ${2 * contacts} forces in well under a second.`,
-      folded("How forces at their limits use up the free numbers", full) + PROGRAM,
-    ],
-    x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: null,
-    experiment: Grab, options: { marked: "grabbed", across: 4, up: 0, axes: { x: { low: 1, high: 4, label: "box of chapter 3: normal force at the floor" }, y: { low: 0, high: 5, label: "between the disks" } } },
-  },
-  {
     name: "chance", title: "A random walk", card: "Largest force that a random walk finds (mean = 1)", heading: "How far does chance go?",
-    text: ({ low, high, states }) => `By hand, the green force goes from ${two(low)} to ${two(high)}. Blue: all it can be together with a violet force, a shadow of S. Now chance walks through S in ${states} steps. Each changes all forces at random and then corrects them until all disks are in balance: a new network, one point of S.`,
+    text: ({ low, high, states, all, disks, contacts, free }) => `The ${all} disks again, ${all - disks} without forces: 2 × ${contacts} forces − (3 × ${disks} − 1) equations = ${free} free numbers. The force you pulled, now green, goes from ${two(low)} to ${two(high)}; blue: with a violet one, a shadow of S. Chance walks through S in ${states} steps: each changes all forces at random, then corrects them to balance all disks.`,
     ask: "What is the largest green force that chance finds?",
     doing: ({ step }) => `Press “Walk”, or drag the slider. Each dot is ${step > 1 ? `a network, one after about every ${step} steps` : "a step"}; network 0 is the one in which the packing came to rest.`,
     see: ({ part, share, free, states, step }) => [
@@ -167,7 +165,7 @@ export const CHAPTERS = [
   },
   {
     name: "push", title: "Why it matters", card: "Largest push before a disk moves (mean force = 1)", heading: "When does something move?",
-    text: ({ mu }) => `The packing of chapter 5, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, step by step. Many points of S would balance the push. Each step starts from the last forces and changes them as little as balance allows, as contacts that stick keep what they have.`,
+    text: ({ mu }) => `The packing of chapter 1, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, step by step. Many points of S would balance the push. Each step starts from the last forces and changes them as little as balance allows, as contacts that stick keep what they have.`,
     verdict: ({ limits: [first, ...others] }) => ({ answer: `It is ${two(first)}${others.length ? `; ${listed(others.map(two))} from other forces` : ""}.`, so: others.length ? "" : undefined }),
     ask: "How hard can you push before a disk moves?",
     doing: () => "Drag the dot to the right, or an arrow away from the marked line. Blue dots: about to slip.",

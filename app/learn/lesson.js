@@ -7,8 +7,7 @@ import { keepChapter } from "../browser/local_storage.js"
 import { STILL } from "../browser/motion.js"
 import { sceneQuery } from "../browser/scene_options.js"
 import { plain } from "../browser/send.js"
-import { CHAPTERS, SUMMARY } from "./chapters.js"
-import { COVER, Cover } from "./cover.js"
+import { CHAPTERS, ONWARDS, SUMMARY } from "./chapters.js"
 import { palette } from "./drawing/palette.js"
 import { ClosingPicture, DARED } from "./drawing/closing_picture.js"
 import { Grab } from "./experiments/grab.js"
@@ -18,7 +17,7 @@ import { Source } from "./source.js"
 
 // The data of later chapters, requested one after the other while the first is read, as some take
 // time.
-const AHEAD = [["scene", "ladder"], ["scene", "groove"], ["scene", "box"], ["scene", "thirteen"], ["packing", "0.1"], ["rail", "grabbed"], ["shadow"], ["push", "0"], ["curve"], ["push", "1"]]
+const AHEAD = [["packing", "0.1"], ["rail", "grabbed"], ["scene", "ladder"], ["scene", "groove"], ["scene", "box"], ["scene", "thirteen"], ["shadow"], ["push", "0"], ["curve"], ["push", "1"]]
 
 class Lesson {
   constructor(model, view) {
@@ -35,7 +34,7 @@ class Lesson {
     model.on("palettes", () => this.paint())
     model.on("remove", () => this.leave())
     this.sized = new ResizeObserver(() => this.paint())
-    window.history.replaceState(null, "", this.address((CHAPTERS[this.named] ?? COVER).name)) // for the way back
+    window.history.replaceState(null, "", this.address(CHAPTERS[this.named].name)) // for the way back
     this.open(this.named)
   }
 
@@ -50,11 +49,10 @@ class Lesson {
     this.experiment = this.mechanism = null
   }
 
-  /** The number of the chapter in the address, otherwise of the first unfinished one; of the cover, -1, before any is begun. */
+  /** The number of the chapter in the address, otherwise of the first unfinished one. */
   get named() {
     const name = new URLSearchParams(window.location.search).get("learn"), named = CHAPTERS.findIndex((one) => one.name === name)
-    if (named >= 0 || !this.progress.begun) return named
-    return Math.max(0, CHAPTERS.findIndex((one) => !this.progress.of(one.name).done))
+    return named < 0 ? Math.max(0, CHAPTERS.findIndex((one) => !this.progress.of(one.name).done)) : named
   }
 
   /** The address of a chapter, with all other parameters of this page. */
@@ -85,7 +83,7 @@ class Lesson {
 
   async open(number) {
     this.close()
-    const chapter = this.dared(CHAPTERS[number] ?? COVER), turn = ++this.openings
+    const chapter = this.dared(CHAPTERS[number]), turn = ++this.openings
     this.number = number
     keepChapter(chapter.name)
     const parts = this.lay(chapter)
@@ -96,7 +94,7 @@ class Lesson {
     try {
       await experiment.load(source)
     } catch (error) {
-      if (chapter === COVER && turn === this.openings) return this.open(0) // which needs no stored packing
+      if (!number && turn === 1) return this.open(1) // which needs no stored packing
       parts.voice.textContent = error.message
       return
     }
@@ -108,14 +106,13 @@ class Lesson {
     if (chapter.said) parts.text.append(createElement("em", { textContent: "A friend’s prediction is shown after yours." }))
     const save = (more) => { this.progress.set(chapter.name, more); this.show() }
     const again = () => { save({ prediction: null, done: false }); this.open(number) }
-    const drawn = () => this.paint()
-    this.mechanism = chapter === COVER ? new Cover(experiment, parts, drawn) : new PredictDoSee({ ...chapter, x }, experiment, parts, this.progress.of(chapter.name), { save, again, drawn })
+    this.mechanism = new PredictDoSee({ ...chapter, x }, experiment, parts, this.progress.of(chapter.name), { save, again, drawn: () => this.paint() })
     this.sized.observe(parts.picture)
     if (!this.model.alone && turn === 1) this.root.querySelector("h1").focus({ preventScroll: true }) // the next stop of the Tab key is the marker
     this.ahead ??= this.fetch()
   }
 
-  /** The experiment of chapter 5, for a movie. */
+  /** The experiment of the first chapter, for a movie. */
   async pulled(host) {
     const grab = new Grab(host, { marked: "grabbed", plain: true }, () => {}, plain(this.model.palettes))
     await grab.load(this.source)
@@ -137,11 +134,12 @@ class Lesson {
     const knob = createElement("label", { className: "knob", hidden: true }), row = createElement("div", { className: "row" }), turn = createElement("span", { className: "turn" })
     const next = last ? button("", () => after.scrollIntoView({ behavior: STILL.matches ? "auto" : "smooth" }))
       : button("", () => this.go(number + 1), { innerHTML: `Next<span>: ${CHAPTERS[number + 1].title}</span> ▸` })
-    if (number >= 0) turn.append(button("◂", () => this.go(number - 1), { ariaLabel: "Back" }))
+    if (number) turn.append(button("◂", () => this.go(number - 1), { ariaLabel: "Back" }))
     turn.append(next)
     row.append(turn)
     const { pathname } = window.location, { scene } = chapter.options
-    const onwards = last ? `${SUMMARY}<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with this scene</a>` : ""
+    const links = ONWARDS.map(([query, title, question]) => `<a href="${pathname}${query}"><b>${title} ▸</b> ${question}</a>`).join("")
+    const onwards = last ? `${SUMMARY}<div class="onwards">${links}</div>` : scene ? `<a href="?scene=${scene}">More with this scene</a>` : ""
     const after = createElement("div", { className: "after", innerHTML: onwards })
     if (last || chapter.name === DARED) after.append(copyButton("Challenge a friend: copy the link", () => this.challenge))
     if (scene) after.firstChild.addEventListener("click", ({ currentTarget }) => { currentTarget.href = sceneQuery(scene, this.experiment.body.mu) })

@@ -3,11 +3,10 @@
 
 import { button, createElement } from "../browser/dom.js"
 import { STILL } from "../browser/motion.js"
-import { QuantityPlot, told } from "./drawing/quantity_plot.js"
+import { QuantityPlot, isRight, told } from "./drawing/quantity_plot.js"
 
 const PREDICT = "Drag the marker to your prediction.", WAIT = "Computing the networks … The first time on a server, this can take a minute."
 const STAGES = ["1 Predict", "2 Do"]
-const NEAR = 0.03 // of the axis: a prediction that is right
 
 export class PredictDoSee {
   /**
@@ -49,7 +48,7 @@ export class PredictDoSee {
 
   mark(value) {
     const [low, high] = this.possible
-    this.prediction = Math.min(high, Math.max(low, value))
+    this.prediction = Math.min(high, Math.max(low, told(this.chapter.x, value)))
     this.show()
   }
 
@@ -125,14 +124,14 @@ export class PredictDoSee {
   speak(stage) {
     const { chapter, experiment, voice, extra } = this, { facts } = experiment
     if (stage < 2) {
-      const words = stage === 0 ? PREDICT : this.ready ? chapter.doing(facts) : WAIT
+      const words = stage === 0 ? chapter.first ?? PREDICT : this.ready ? chapter.doing(facts) : WAIT
       this.say(voice, [words], () => [createElement("p", { className: "todo", innerHTML: `<b>${STAGES[stage]}</b> ${words}` })])
     } else {
       const { headline = "" } = experiment, sentences = facts.empty ? [] : chapter.see(facts).slice(headline ? -1 : 0) // the others are of the friction asked for
       this.say(voice, [headline, ...sentences], () => this.answer(headline, sentences))
     }
-    const [count, aside] = stage === 2 || (stage && chapter.live) ? [chapter.count?.(facts), experiment.aside] : []
-    this.say(extra, [JSON.stringify([count, aside])], () => [count && sumOf(count), aside && looked(aside)].filter(Boolean))
+    const count = (stage === 2 || (stage && chapter.live)) && chapter.count?.(facts)
+    this.say(extra, [JSON.stringify(count)], () => (count ? [sumOf(count)] : []))
   }
 
   /** Replace the contents of an element by parts(), if its words change. */
@@ -145,8 +144,8 @@ export class PredictDoSee {
 
   /** How far the prediction is off, in the numbers shown; on a logarithmic axis, in which direction. */
   get judged() {
-    const { chapter: { x }, experiment, prediction } = this, off = told(x, experiment.answer) - told(x, prediction)
-    if (x.log ? !off : Math.abs(off) < NEAR * (x.high - x.low)) return ": well done"
+    const { chapter: { x }, experiment: { answer }, prediction } = this, off = told(x, answer) - told(x, prediction)
+    if (isRight(x, prediction, [answer, answer])) return ": well done"
     return `, ${x.log ? "" : `${told(x, Math.abs(off))} `}too ${off > 0 ? "low" : "high"}`
   }
 
@@ -166,13 +165,6 @@ export class PredictDoSee {
     verdict.append(...["b", "span"].map((tag, k) => createElement(tag, { textContent: said[k] })))
     return [verdict, ...sentences.map((innerHTML) => createElement("p", { innerHTML }))]
   }
-}
-
-/** A plot that is only looked at. */
-function looked({ axes, ...state }) {
-  const figure = createElement("figure", { className: "aside" })
-  new QuantityPlot(figure, axes, {}).draw(state)
-  return figure
 }
 
 /** A table of a sum, which is its last row. */

@@ -10,8 +10,6 @@ export class Progress {
   /** {prediction, answer, done} of a chapter. */
   of(name) { return this.chapters[name] ?? { prediction: null, done: false } }
 
-  get begun() { return Object.keys(this.chapters).length > 0 }
-
   set(name, more) {
     this.chapters[name] = { ...this.of(name), ...more }
     try { localStorage.setItem(KEY, JSON.stringify(this.chapters)) } catch { /* a private window */ }

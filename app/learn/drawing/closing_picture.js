@@ -4,11 +4,11 @@ import { circle, font, line } from "../../browser/canvas_paths.js"
 import { createElement, button } from "../../browser/dom.js"
 import { save } from "../../browser/download.js"
 import { recorded } from "../../browser/movie.js"
-import { Scale, told } from "./quantity_plot.js"
+import { Scale, isRight, told } from "./quantity_plot.js"
 
-const WIDE = 1200, HIGH = 630 // px, as links are previewed
-const RAIL = { left: 670, right: 990, top: 186, step: 54 } // of the predictions
-const TITLE = ["How far can forces go?", "What I said, and what is possible"]
+const WIDE = 800, HIGH = 1120 // px, to be read on a phone
+const PACKING = { top: 112, high: 370 } // its visible part
+const RAIL = { left: 40, right: 540, top: 584, step: 64 } // of the predictions
 const MOVIE = { wide: 720, high: 900, edge: 72 } // px; edge: above the packing
 const UP_MS = 4000, DOWN_MS = 4000, ASKS_MS = 3000 // of the movie: the force grows, falls, and a question ends it
 export const DARED = "four-hundred" // the chapter of the force in the movie, and of the challenge
@@ -32,14 +32,20 @@ export class ClosingPicture {
   draw(scene, chapters, look) {
     Object.assign(this, { chapters, look })
     const g = this.canvas.getContext("2d"), { left, right, top, step } = RAIL, write = writer(g), place = (x, value) => new Scale(x, left, right).px(Math.min(x.high, Math.max(x.low, value)))
-    this.packing(g, scene, 0, HIGH)
-    TITLE.forEach((words, k) => write(words, left, 56 + 38 * k, look.ink, k ? "20px" : "bold 32px"))
-    write("○ my prediction", left, 136, look.hand, "17px")
-    write("● the answer", left + 160, 136, look.cold, "17px")
+    const answers = chapters.filter(({ prediction = null, answer }) => answer && prediction !== null), hits = answers.filter(({ x, prediction, answer }) => isRight(x, prediction, answer))
+    const bottom = PACKING.top + PACKING.high
+    this.packing(g, scene, PACKING.top + (PACKING.high - WIDE) / 2, WIDE)
+    g.fillStyle = look.paper
+    g.fillRect(0, 0, WIDE, PACKING.top)
+    g.fillRect(0, bottom, WIDE, HIGH)
+    write("How far can forces go?", left, 52, look.ink, "bold 38px")
+    write(`What I said, and what is possible: ${hits.length} of ${answers.length} right`, left, 90, look.ink, "23px")
+    write("○ my prediction", left, bottom + 40, look.hand, "21px")
+    write("● the answer", left + 200, bottom + 40, look.cold, "21px")
     chapters.forEach((chapter, k) => {
       const { card, x, prediction = null, answer } = chapter, y = top + step * k
-      write(card, left, y - 14, look.ink, "17px")
-      if (answer) write(`${prediction === null ? "" : `${told(x, prediction)} → `}${answered(chapter)}`, right + 16, y + 8, look.ink, "16px")
+      write(card, left, y - 14, look.ink, "21px")
+      if (answer) write(`${prediction === null ? "" : `${told(x, prediction)} → `}${answered(chapter)}`, right + 20, y + 10, look.ink, "21px")
       Object.assign(g, { strokeStyle: look.edge, lineWidth: 1.5 })
       line(g, [left, y + 3], [right, y + 3])
       if (answer) {
@@ -51,8 +57,8 @@ export class ClosingPicture {
       Object.assign(g, { strokeStyle: look.hand, lineWidth: 3 })
       g.stroke()
     })
-    write(address(window.location), left, 616, look.weight, "15px")
-    const named = chapters.filter(({ prediction, answer }) => answer && prediction !== null).map((chapter) => `${chapter.card}: ${told(chapter.x, chapter.prediction)}, answer ${answered(chapter)}`)
+    write(address(window.location), left, HIGH - 24, look.weight, "20px")
+    const named = answers.map((chapter) => `${chapter.card}: ${told(chapter.x, chapter.prediction)}, answer ${answered(chapter)}`)
     this.canvas.ariaLabel = `Your predictions. ${named.join("; ")}`
   }
 

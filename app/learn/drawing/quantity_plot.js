@@ -5,6 +5,7 @@ const NS = "http://www.w3.org/2000/svg"
 const PILL = { high: 26, letter: 6.8, padding: 18 } // px
 const GAP = 5, INSET = 12 // px between a line and words next to it, and between two axes and the dot at their ends
 const GRAB = 26 // px from the dot within which dragging does not move it
+const NEAR = 0.03 // of the axis: a prediction that is right
 const STEPS = 60, FAST = 5 // keyboard steps along an axis; with the Shift key, so many at once
 let plots = 0 // so far: names what clips them
 
@@ -141,7 +142,7 @@ export class QuantityPlot {
     this.further.replaceChildren()
     for (const [x, y, up] of this.beyond(exact)) {
       element(this.further, "path", { d: up ? `M${x} ${y - 13}l-9 14h18z` : `M${x + 13} ${y}l-14 -9v18z` })
-      if (endless) element(this.further, "text", { x: x - (up ? 24 : 4), y: y + (up ? 0 : 26), "text-anchor": "middle" }).textContent = "∞"
+      if (endless) element(this.further, "text", { x: x + (up ? 22 : -4), y: y + (up ? 0 : 26), "text-anchor": "middle" }).textContent = "∞"
     }
     this.second.setAttribute("d", second.length ? `M${second.map(([x, y]) => `${this.x.px(x)} ${this.right.px(y)}`).join("L")}h0` : "")
     this.names.replaceChildren()
@@ -174,7 +175,7 @@ export class QuantityPlot {
         return part >= 0 && part <= 1 ? [other ? Math.min(other.axis.high, Math.max(other.axis.low, at)) : at] : []
       })
       if (!met.length || !points.some((point) => point[d] > 1.001 * high)) return []
-      const middle = (Math.min(...met) + 3 * Math.max(...met)) / 4
+      const middle = (Math.min(...met) + 7 * Math.max(...met)) / 8
       return [[...this.place(d ? [middle, high] : [high, middle]), d === 1]]
     })
   }
@@ -278,6 +279,12 @@ export class QuantityPlot {
 
 /** A value of the quantity on an axis, in words. */
 export const told = ({ log, digits = 2 }, value) => (log ? String(Number(value.toPrecision(2))) : value.toFixed(digits))
+
+/** Whether a prediction is right, in the numbers shown: between two values of the answer, or near them. */
+export function isRight(x, prediction, [low, high]) {
+  const off = Math.max(told(x, low) - told(x, prediction), told(x, prediction) - told(x, high), 0)
+  return x.log ? !off : off < NEAR * (x.high - x.low)
+}
 
 /** A number on an axis. */
 const name = (value) => String(Number(value.toPrecision(3))).replace("-", "−")

@@ -1,26 +1,24 @@
 // One force of 400 disks is dragged: all others follow along networks computed by the server. The
-// marked one is asked for, but any other can be dragged too, from the network on screen. options: marked: which contact is
-// marked, as the packing names it; axes of the small plot, with `across` and `up`: the forces on them.
+// marked one is asked for, and goes a little way before the prediction; any other can be dragged too, from the network on
+// screen. options: marked: which contact is marked, as the packing names it.
 
 import { networkAt } from "../../packing/replay/replay.js"
 import { OPENS } from "../../packing/drawing/first_motion.js"
-import { hull } from "../model/polytope.js"
-import { SceneInHand } from "../model/scene_in_hand.js"
 import { PackingExperiment } from "./packing_experiment.js"
 
 const FOUND = 0.01 // of the distance between both ends
 const CHANGED = 0.1 // mean forces: contacts that changed by more are counted
+const TASTE = 0.3 // of the way to an end: so far a force can be pulled before the prediction
 const LONG = 1.6 // a drag over the whole picture, relative to the distance between both ends
 
 export class Grab extends PackingExperiment {
   async load(source) {
-    const { marked, axes } = this.options, packing = await source.get("packing", "0.1"), contact = packing[marked]
+    const { marked } = this.options, packing = await source.get("packing", "0.1"), contact = packing[marked]
     Object.assign(this, { source, packing, contact, held: null })
     this.network = this.before = this.asPacked(packing)
     this.tangential = packing.tangential.subarray(0, packing.contacts)
     this.start = this.value
     this.canvas.show(packing, contact)
-    if (axes) this.box = new SceneInHand(await source.get("scene", "box"), () => {}).body
     this.fetched = source.get("rail", marked).then((rail) => { this.rail = this.first = { ...rail, contact } })
   }
 
@@ -42,18 +40,19 @@ export class Grab extends PackingExperiment {
     return network.reduce((sum, v, c) => sum + (Math.abs(v - this.before[c]) > CHANGED && c !== this.contact ? 1 : 0), 0)
   }
 
-  /** At the end of the first rail: contacts that are open or slip, and disks that have lost all their contacts. */
+  /** At the end of the first rail: contacts that are open or slip. */
   get atEnd() {
-    const { packing: { contacts, i, j }, first: rail } = this
-    const [normal, tangential] = ["normal", "tangential"].map((name) => rail?.[name].subarray(-contacts) ?? [])
-    const marks = this.marks(normal, tangential), held = new Set(), touched = new Set([...i, ...j])
-    for (let c = 0; c < contacts; c++) if (marks[c] !== OPENS) held.add(i[c]).add(j[c])
-    return { opened: marks.filter((mark) => mark === OPENS).length, sliding: marks.filter((mark) => mark === 1).length, bare: rail ? touched.size - held.size : 0 }
+    const [normal, tangential] = ["normal", "tangential"].map((name) => this.first?.[name].subarray(-this.packing.contacts) ?? [])
+    const marks = this.marks(normal, tangential), among = (kind) => marks.filter((mark) => mark === kind).length
+    return { opened: among(OPENS), sliding: among(1) }
   }
 
-  drag(x) {
-    this.say("")
-    this.pull(this.contact, () => x)
+  drag(x) { this.pull(this.contact, () => x) }
+
+  /** How far the force of the rail goes: a little way before the prediction. */
+  get reach() {
+    const { rail: { values }, start, locked } = this
+    return [values[0], values.at(-1)].map((end) => (locked ? start + TASTE * (end - start) : end))
   }
 
   /** Give a contact the force value(its rail), as far as possible, once its rail is there. */
@@ -72,21 +71,23 @@ export class Grab extends PackingExperiment {
       }
       return this.pull(...this.wanted)
     }
-    const { rail, seen, start } = this, [low, high] = [rail.values[0], rail.values.at(-1)], now = Math.min(high, Math.max(low, value(rail)))
+    const { rail, seen, start, locked } = this, [low, high] = this.reach, asked = value(rail), now = Math.min(high, Math.max(low, asked))
     const { normal, tangential } = networkAt(rail, now)
     Object.assign(this, { network: normal, tangential })
     this.seen = [Math.min(this.value, seen?.[0] ?? start), Math.max(this.value, seen?.[1] ?? start)]
-    if (contact === this.contact) this.answered ||= high - now < FOUND * (high - low)
-    else this.say(`this line: ${now.toFixed(2)}, possible ${rail.lower.toFixed(2)} to ${rail.upper.toFixed(2)}`)
+    if (contact === this.contact) {
+      this.answered ||= !locked && high - now < FOUND * (high - low)
+      this.say(locked && asked !== now ? "It goes further. First predict how far." : `${this.changesTo(normal)} other forces follow`)
+    } else this.say(`this line: ${now.toFixed(2)}, possible ${rail.lower.toFixed(2)} to ${rail.upper.toFixed(2)}`)
     this.changed()
   }
 
-  takes() { return !this.locked && Boolean(this.rail) }
+  takes(contact) { return Boolean(this.rail) && (!this.locked || contact === this.contact) }
 
   take(contact) {
     this.held = contact
     this.taken = this.network[contact]
-    this.say(contact === this.contact ? "" : `this line: ${this.taken.toFixed(2)}; finding how far it can be pulled …`)
+    if (contact !== this.contact) this.say(`this line: ${this.taken.toFixed(2)}; finding how far it can be pulled …`)
     this.pulled(0)
   }
 
@@ -103,12 +104,5 @@ export class Grab extends PackingExperiment {
   get picture() {
     const { packing, contact, seen, answered } = this, level = (x) => [x, 0]
     return { now: [this.value, 0], seen: seen?.map(level), exact: answered ? [packing.least[contact], packing.largest[contact]].map(level) : [] }
-  }
-
-  /** S of two disks in a box: its largest force is at a corner. */
-  get aside() {
-    const { axes, across, up } = this.options, outline = hull(this.box.corners.map(({ u }) => { const F = this.box.forces(u); return [F[across], F[up]] }))
-    const most = Math.max(...outline.map(([x]) => x))
-    return { axes, exact: outline, filled: true, dots: outline.filter(([x]) => x > most - 1e-9), answer: { value: most, words: most.toFixed(2) } }
   }
 }
