@@ -110,7 +110,7 @@ export const CHAPTERS = [
     doing: () => "Drag the dot as far as it goes: right, up, left and down. What its path encloses turns blue: between two possible sets of forces, every mixture is possible too.",
     see: ({ high, weight, endless }) => [
       `Both disks weigh ${weight}. The other ${two(high - weight)} comes from the walls, where friction pulls the wedged disks down. With more, the lower disk would slip on the floor.`,
-      `Like the largest value of any force, it is at a corner of S. Finding that corner is called a linear program; a computer does it for every force of 400 disks in well under a second.${PROGRAM}`,
+      `Like the largest value of any force, it is at a corner of S. Finding it is called a linear program; a computer does it for all forces of 400 disks in under a second.${PROGRAM}`,
       prompted({ endless }, "Drag the dot along the edges: above the drawing you read what is about to slip. Then raise the friction, until S has no end here either."),
     ],
     count: (facts) => counted(facts, false),
