@@ -1,5 +1,5 @@
-// The controls around the scene: tools above it; below it the player's bar, the legend, and the
-// controls that compare and check networks.
+// The controls around the scene: tools above it; below it the player's bar, the legend, and numbers
+// that check the network on screen.
 
 import { createElement } from "../browser/dom.js"
 import { Keyboard } from "./keyboard.js"
@@ -7,11 +7,8 @@ import { PlayerBar } from "./player_bar.js"
 import { LEAST } from "./drawing/chain_strokes.js"
 
 const ICONS = {
-  pin: "M12 2a7 7 0 0 1 7 7c0 5-7 13-7 13S5 14 5 9a7 7 0 0 1 7-7zm0 4a3 3 0 1 0 0 6 3 3 0 0 0 0-6z",
   undo: "M12 5V1L6 6l6 5V7a6 6 0 1 1-6 6H4a8 8 0 1 0 8-8z",
   hold: "M8 2h8v2l-1 1v6l3 3v2h-5v6l-1 1-1-1v-6H6v-2l3-3V5L8 4z",
-  between: "M4 12l5-5v3h6V7l5 5-5 5v-3H9v3z",
-  split: "M3 5h8v14H3zM13 5h8v14h-8z",
   closer: "M11 4h2v7h7v2h-7v7h-2v-7H4v-2h7z",
   farther: "M4 11h16v2H4z",
   whole: "M4 4h6v2H6v4H4zM14 4h6v6h-2V6h-4zM4 14h2v4h4v2H4zM18 14h2v6h-6v-2h4z",
@@ -50,12 +47,7 @@ const BUTTONS = `
     </div>
   </div>
   <div class="legend"></div>
-  <div class="foot"><details class="extras"><summary>Compare and check</summary>
-  <div class="game">
-    ${button("pin", "pin this network, to compare others with it", "Pin")}
-    ${button("between", "between the pinned network and this one", "To and fro")}
-    ${button("split", "the pinned network and this one; another μ then comes beside this one", "Side by side")}
-  </div>
+  <div class="foot"><details class="extras"><summary>Check</summary>
   <div class="read">
     <span class="differs">from that <b class="origin"></b>, on average, <b class="apart"></b> of the mean force</span>
     <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> of the mean force</span>
@@ -66,7 +58,7 @@ const BUTTONS = `
       <span tabindex="0" data-term="eta3">0.15 η₃ <b class="eta3"></b></span>
     </span>
   </div>
-  <div class="game">Made: <span class="source"></span></div>
+  <div>Made: <span class="source"></span></div>
   <div class="skips" data-term="segment" tabindex="0"></div>
   </details><div class="message" role="status"></div></div>`
 const CLOSER = 0.7 // zoom factor of a button
@@ -168,21 +160,8 @@ export class Buttons {
   /** Whether a pulled network is on screen. */
   tellHeld(held) { this.root.classList.toggle("held", held) }
 
-  /** Whether two networks are requested, and whether they are shown. */
-  showSplit(requested, shown) {
-    if (requested) this.part("extras").open = true
-    this.part("split").classList.toggle("on", requested)
-    this.root.classList.toggle("two", shown)
-  }
-
   /** keepable: seconds for computing the networks that were not stored; 0: they cannot be computed. */
-  tellTrack(replay, keepable) {
-    const between = this.part("between"), { swinging, walk } = replay
-    this.bar.showTrack(replay, keepable)
-    between.classList.toggle("on", swinging)
-    if (swinging) this.part("extras").open = true
-    between.disabled = !swinging && walk.number.length < 2
-  }
+  tellTrack(replay, keepable) { this.bar.showTrack(replay, keepable) }
 
   /** The numbers of the position. */
   read(replay) {

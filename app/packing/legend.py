@@ -156,7 +156,6 @@ def colour_bar(state: AppState) -> tuple[str, list[str], str]:
         "change": change,
         "deviation": (f"≥ {FULL_DEVIATION:g} σ less", DIVERGING, f"≥ {FULL_DEVIATION:g} σ more"),
         "known": ("0", list(scales["known"][::8]), _most_shortened(state)),
-        "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
     }[looks.colour]
 
 
@@ -252,9 +251,8 @@ def legend(state: AppState) -> str:
 
 
 def meaningful(state: AppState, labels: dict[str, str], name: str) -> dict[str, str]:
-    """The quantities for colour or width: pinned state and known forces only if present."""
-    pinned = state.looks.reference
-    conditions = {"sign": pinned, "difference": pinned, "known": state.knowledge.known}
+    """The quantities for colour or width: known and measured forces only if present."""
+    conditions: dict[str, object] = {"known": state.knowledge.known}
     conditions |= dict.fromkeys(("deviation", "measured"), state.measured is not None)
     chosen = getattr(state.looks, name)
     return {

@@ -16,7 +16,6 @@ import { Playback } from "./replay/playback.js"
 import { Pushed } from "./hand/push_animation.js"
 import { Replay } from "./replay/replay.js"
 import { Scene } from "./drawing/scene.js"
-import { Split } from "./drawing/split_view.js"
 import { Sway } from "./drawing/displacement.js"
 
 const PLOTS_MS = 30 // shortest time between two repaints of the plots while a force is pulled
@@ -68,10 +67,9 @@ class Player {
       this.drawMotion(sheet)
       this.pins.onSheet(sheet, scene)
     }
-    this.split = new Split(this)
     this.sway = new Sway(this.scene)
     this.pushed = new Pushed(this)
-    this.scene.onRepaint = () => { this.buttons.count(); this.split.paint(); this.tellView() }
+    this.scene.onRepaint = () => { this.buttons.count(); this.tellView() }
     this.scene.describe = {
       contact: (c) => this.look.contact(c, this.replay),
       grain: (g) => this.look.grain(g, this.replay),
@@ -118,7 +116,7 @@ class Player {
     // The visitor's own choice while a walk grew outlasts it; what played by itself ends with it.
     const chosen = place !== null && !this.playback.newest, number = playing ? this.replay.walk.number[this.replay.frame] : null
     this.playback.running = false // silently: another replay replaces this one
-    this.replay = new Replay(walk.room ? roomy(walk) : walk, model.between)
+    this.replay = new Replay(walk.room ? roomy(walk) : walk)
     this.look = new Look(model, this.replay.walk)
     this.hand.pulled = null
     this.hand.settle()
@@ -132,13 +130,11 @@ class Player {
     this.showRequested()
     scene.show(this.replay.walk)
     if (zoom) scene.view = { x: zoom[0], y: zoom[1], half: zoom[2] }
-    this.split.show()
     scene.resize()
     scene.repaint()
     this.live.glide(view)
     const rests = chosen ? !playing : walk.rests
-    if (this.replay.swinging) this.show(0, false)
-    else if (!shown) this.show(model.frame, false)
+    if (!shown) this.show(model.frame, false)
     else if (rests && !chosen) this.show(walk.begin, false)
     else this.show(place ?? (number === null || number > walk.states ? walk.begin : this.replay.positionOf(number)), false)
     this.playback.newest = walk.room > 0 || (this.playback.newest && place !== null && !rests)
@@ -146,7 +142,7 @@ class Player {
     const { replay } = this
     requestAnimationFrame(() => {
       if (this.replay !== replay) return
-      if (chosen && !replay.swinging) this.show(place)
+      if (chosen) this.show(place)
       if (!shown && !walk.room) this.playFirst()
       else this.play(!rests && !this.pushes)
       this.tellTab()
@@ -174,7 +170,6 @@ class Player {
     const { replay } = this
     if (!replay?.walk.numbers) return
     extend(replay.walk, states)
-    if (!replay.swinging) replay.follow(null, replay.position)
     this.tellTrack()
     this.look.measure()
     if (!this.playing) this.paintPlots()
@@ -194,8 +189,8 @@ class Player {
     const { model, live } = this, { style } = document.documentElement
     this.buttons.root.classList.toggle("moving", live.moves)
     this.buttons.showRequested(live.moves || this.grows ? "" : model.requested)
-    // Neighbouring plots are dimmed, or hidden beside another packing, by these: a style set from
-    // Python would make Bokeh lay out the whole page again.
+    // Neighbouring plots are dimmed or hidden by these: a style set from Python would make Bokeh
+    // lay out the whole page again.
     const pale = { "--still": model.requested, "--growing": model.requested && !this.grows }
     for (const [name, old] of Object.entries(pale)) {
       style.setProperty(name, old ? OLD : 1)
@@ -225,13 +220,9 @@ class Player {
     this.select()
     this.scene.selected = contact ?? this.scene.selected
     this.scene.drawMarks()
-    this.split.paint()
   }
 
-  paint() {
-    this.scene.drawChains(this.look.of(this.replay.mixed))
-    this.split.step()
-  }
+  paint() { this.scene.drawChains(this.look.of(this.replay.mixed)) }
 
   paintPlots(now = performance.now()) {
     const { model, plots, replay } = this
@@ -247,7 +238,7 @@ class Player {
   /** Redraw the same network with a new look. */
   repaint() { if (!this.live.moves) this.paint() }
 
-  /** Go to a position on the track and paint it; tell: also tell the server. */
+  /** Go to a position and paint it; tell: also tell the server. */
   show(to, tell = true) {
     this.replay.go(to)
     this.paint()
@@ -287,13 +278,12 @@ class Player {
   }
 
   again() {
-    this.split.show()
     if (this.replay && !this.playing && !this.live.moves) this.show(this.replay.position, false)
   }
 
-  /** The packing as SVG text; its caption names the push, or the place between two compared networks. */
+  /** The packing as SVG text; its caption names the push. */
   picture(caption) {
-    const { pushed, replay, scene } = this, where = replay.swinging ? [`Shown: ${replay.title}.`] : []
+    const { pushed, replay, scene } = this, where = []
     if (pushed.held && pushed.load) where.push(`Contact ${replay.walk.backbone[this.pins.pushedContact(scene)]}: ${pushed.words}.`)
     return this.scene.picture({ ...caption, lines: [...where, ...caption.lines] })
   }
@@ -331,7 +321,7 @@ class Player {
   /** Start playing when the page opens, unless its link says otherwise or motion is reduced. */
   playFirst() {
     const { model } = this
-    if (STILL.matches || model.paused || model.between || this.pulled || this.pushes) model.paused = true
+    if (STILL.matches || model.paused || this.pulled || this.pushes) model.paused = true
     else requestAnimationFrame(() => this.play(true))
   }
 
@@ -365,14 +355,6 @@ class Player {
     this.tell(known ? { release: contact } : { hold: [contact, this.hand.wanted(contact) ?? mixed.normal[contact], error] })
   }
 
-  /** Begin or end the motion to and fro between the pinned state and this one. */
-  between({ swinging, frame, last }) {
-    const { model } = this, other = frame || last
-    if (swinging) { model.between = null; return }
-    model.between = [model.reference === other ? 0 : model.reference, other]
-    this.play(true)
-  }
-
   // Messages from the server
 
   /** Handlers for changes of the model's parameters. */
@@ -391,15 +373,13 @@ class Player {
       walk: () => this.load(),
       keepable: loaded(() => this.tellTrack()),
       motion: () => this.pushed.tellMotion(),
-      twin: () => this.split.take(),
       exact: measure,
       loads: measure,
       measured: measure,
       reduction: measure,
       plane: () => { this.plots.plane = plain(model.plane); this.mark(); this.again() },
-      between: loaded((replay) => this.retrack(replay)),
       frame: loaded((replay) => {
-        if (this.playing || replay.swinging || model.frame === replay.frame) return
+        if (this.playing || model.frame === replay.frame) return
         this.pushed.leave()
         this.show(model.frame, false)
       }),
@@ -408,13 +388,6 @@ class Player {
       pins: loaded(() => { this.recover(); this.mark() }),
       contact: loaded(() => { this.recover(); buttons.typed = false; this.mark() }),
     }
-  }
-
-  retrack(replay) {
-    const { frame } = replay
-    replay.follow(this.model.between)
-    this.tellTrack()
-    this.show(replay.swinging ? 0 : frame)
   }
 }
 
@@ -425,7 +398,7 @@ export function render({ model, view }) {
   view.model.data.player = player
   view.model.data.scene = player.scene // for code that finds the model by its name
   for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
-  const looks = ["most", "most_change", "colour", "thickness", "full", "stretch", "reference", "split", "scale", "tab", "views", "wide"]
+  const looks = ["most", "most_change", "colour", "thickness", "full", "stretch", "scale", "tab", "views", "wide"]
   model.on(looks, () => player.again())
   model.on("tab", () => player.showRequested())
   const renew = () => { player.again(); player.mark() }
@@ -448,6 +421,6 @@ export function render({ model, view }) {
   model.on("remove", () => {
     wide.removeEventListener("change", tellWidth)
     observer.disconnect(); player.buttons.remove(); player.live.remove(); for (const handle of player.plots.handles) handle.remove() })
-  for (const name of ["opened", "legend", "source", "busy", "requested", "plane", "twin", "walk", "motion"]) changes[name]()
+  for (const name of ["opened", "legend", "source", "busy", "requested", "plane", "walk", "motion"]) changes[name]()
   return player.buttons.root
 }

@@ -45,8 +45,8 @@ STATES |= {"eta1": Array, "eta2": Array, "eta3": Array}
 
 # Parameters of the view that the player also knows, and those that it may change.
 APPEARANCE = sorted(set(Appearance.param) - {"name"})
-SHARED = ("contact", "frame", "reference", "split", "beside", "colour", "thickness", "full")
-SHARED += ("stretch", "paused", "opened", "pulled")
+SHARED = ("contact", "frame", "colour", "thickness", "full", "stretch", "paused")
+SHARED += ("opened", "pulled")
 
 SCALES = {"width": CHAIN_WIDTH, "deviation": FULL_DEVIATION}
 
@@ -98,9 +98,7 @@ class Player(Scripted, Appearance):
     keepable = param.Number(doc="expected s for storing all networks of the walk; 0: it is done")
     source = param.String(doc="where the states come from, in words")
     busy = param.Boolean()
-    twin = param.Dict(default={}, doc="its frames, as `walk`, with its `exact`")
     zoom = param.List(default=None, allow_None=True, doc="x, y, half width of what is seen; or all")
-    between = param.List(default=None, allow_None=True)
     motion = param.Dict(default={}, doc="flat field (2N,), contacts (N_c,), animated; see Motion")
 
     def __init__(self, state: AppState, document: Document | None = None) -> None:
@@ -119,24 +117,19 @@ class Player(Scripted, Appearance):
         for name in SHARED:
             self.param.watch(lambda event: looks.param.update({event.name: event.new}), name)
         self._shown = None
-        for name in ("between", "zoom"):
-            self.param.watch(self._go, name)
+        self.param.watch(self._go, "zoom")
         looks.param.watch(self._follow, APPEARANCE)
         observe(self._follow, state, "source", "loads", "work.busy")
-        observe(
-            self._show, state, "shown", "exact", "measured", "knowledge.narrowed", "looks.between",
-            "looks.full",
-        )  # fmt: skip
+        observe(self._show, state, "shown", "exact", "measured", "knowledge.narrowed", "looks.full")
         observe(self._pin, state, "replay", "knowledge.known", "knowledge.ranked")
         observe(self._move, state, "motion")
         observe(self._compare_held, state, "shown", "replay", "knowledge.known")
-        observe(self._accompany, state, "comparison.twin")
         dress = self.param.update
         observe(lambda event: dress(plane=projection(event.new)), state, "plane")
         observe(lambda event: dress(palettes=palettes(event.new)), looks, "dark")
         observe(
             self._explain, state, "looks.colour", "looks.thickness", "looks.full", "looks.stretch",
-            "looks.dark", "looks.tab", "looks.reference", "looks.pulled", "shown", "exact", "loads",
+            "looks.dark", "looks.tab", "looks.pulled", "shown", "exact", "loads",
             "measured", "knowledge.known", "knowledge.narrowed", "hand.pulls", "work.moving",
             "pushed",
         )  # fmt: skip
@@ -144,7 +137,6 @@ class Player(Scripted, Appearance):
         self._bounding = state.work.task(reported=False)
         observe(self._bound_thrust, state, "replay")
         self._show()
-        self._accompany()
         self._bound_thrust()
         self._pin()
         self._compare_held()
@@ -178,10 +170,8 @@ class Player(Scripted, Appearance):
     # What it is sent
 
     def _go(self, event: Any) -> None:
-        """To and fro, or to another part of the picture; browsers send tuples as lists."""
-        self._state.looks.param.update(
-            {event.name: None if event.new is None else tuple(event.new)}
-        )
+        """To another part of the picture; browsers send tuples as lists."""
+        self._state.looks.zoom = None if event.new is None else tuple(event.new)
 
     def _follow(self, *events: Any) -> None:
         self.param.update({event.name: event.new for event in events})
@@ -197,7 +187,6 @@ class Player(Scripted, Appearance):
             "reduction": reduction(state.knowledge, replay) if state.obeys_held else None,
             "measured": measured(state, replay),
             "most": full_colour(state),
-            "between": None if looks.between is None else list(looks.between),
         }
         if self._shown is not replay:
             self._shown = replay
@@ -211,15 +200,6 @@ class Player(Scripted, Appearance):
         """Hide the held forces in the tab of pushes, which ignore them, and show them in others."""
         if self._state.knowledge.known and "perturb" in (event.old, event.new):
             self._show()
-
-    def _accompany(self, *events: Any) -> None:
-        """Show another packing next to the one on screen."""
-        twin = self._state.comparison.twin
-        if twin is None:
-            self.twin = {}
-        else:
-            exact = exact_intervals(twin.exact, twin.replay)
-            self.twin = frames(twin.replay) | {"exact": exact}
 
     def _bound_thrust(self, *events: Any) -> None:
         """Of bodies: compute where the resultants at their joints can pass."""

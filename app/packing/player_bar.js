@@ -49,7 +49,7 @@ export class PlayerBar {
     this.showPlaying(false)
   }
 
-  /** Rows of the track per second. */
+  /** Rows per second. */
   get speed() { return 2 ** Number(this.speedInput.value) }
 
   /** Go to the network whose number was typed, or to the nearest stored one. */
@@ -84,17 +84,15 @@ export class PlayerBar {
   showRate() {
     const { speed, replay } = this, shown = speed < 10 ? Number(speed.toFixed(1)) : Math.round(speed)
     const words = `${replay?.walk.room ? "≥ " : ""}${shown}${replay?.stride > 1 ? " stored" : ""} network${shown === 1 ? "" : "s"}/s`
-    this.rate.textContent = replay?.swinging ? "" : words
+    this.rate.textContent = words
   }
 
-  /** Show another track: its length, and whether the omitted networks can be computed. */
+  /** Show another replay: its length, and whether the omitted networks can be computed. */
   showTrack(replay, keepable) {
     this.replay = replay
     this.root.classList.remove("empty")
-    const { last, swinging, stride } = replay
+    const { last, stride } = replay
     this.scrub.max = last
-    this.scrub.step = swinging ? 0.01 : 1
-    this.root.classList.toggle("swings", swinging)
     this.root.classList.toggle("single", replay.walk.free === 0)
     this.missed = null
     this.showStored()

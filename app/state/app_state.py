@@ -19,7 +19,6 @@ from ..results.progress_feed import Following, numbers
 from ..results.replays import Replay
 from ..results.selection import Selection, brief, command
 from . import known, perturbations
-from .comparison import Comparison
 from .known import Knowledge
 from .links import (
     OF_A_REPLAY,
@@ -51,7 +50,7 @@ class AppState(param.Parameterized):
     """The states selected, and the catalogue to select from.
 
     `looks` is how they are shown, `work` what is being computed; these do not depend on it.
-    `knowledge` holds known forces, `hand` what was pulled, and `comparison` the comparison.
+    `knowledge` holds known forces, and `hand` what was pulled.
     """
 
     catalogue = param.List(doc="all cells, by series and μ")
@@ -86,7 +85,7 @@ class AppState(param.Parameterized):
         # A refusal is shown until the next action; watched before the parts that may refuse.
         chosen = [name for name in VIEW if name in Looks.param and name not in PASSING]
         self.looks.param.watch(self._forget, chosen)
-        self.knowledge, self.comparison = Knowledge(self), Comparison(self)
+        self.knowledge = Knowledge(self)
         self.hand = Hand(self)  # uses what is known
         self.parts = self.looks, self.knowledge, self.hand  # which a link names
         self._viewed: dict[str, Any] = {
@@ -238,7 +237,6 @@ class AppState(param.Parameterized):
 
     def ask(self, selection: Selection, at_once: bool = False) -> None:
         """Select states: shown if a store has them, otherwise `missing`, or computed at_once."""
-        self.comparison.keep(selection)
         self.work.message = ""
         cell = cell_of(self.catalogue, selection)
         if cell is not None:
@@ -294,7 +292,6 @@ class AppState(param.Parameterized):
             cells = [cell for cell in self.catalogue if cell.series == series]
             matching = cells and [nearest_cell(cells, self.selection.mu)]
         if matching:
-            self.comparison.keep(matching[0].selection)
             self.show(matching[0])
         elif mu is not None and self.cell is not None:
             self.ask(self.given_held(self.cell.selection.at(mu)))
@@ -639,9 +636,6 @@ class AppState(param.Parameterized):
         if self.selection is None:
             return ""
         view = self.view
-        if view["beside"] == self.selection.mu:
-            # Between the choice of another μ and its states, the old comparison is still on screen.
-            view["beside"] = None
         if self.looks.tab != "perturb":
             view["pushed"] = None
         if self.looks.pulled == "push":  # every push begins with the network as packed

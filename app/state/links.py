@@ -135,13 +135,8 @@ def _number(given: dict[str, str], name: str) -> float:
 # The view
 
 
-def _pair(text: str) -> tuple[int, int]:
-    a, b = (integer(part) for part in text.split("-"))
-    return a, b
-
-
 def _two(text: str) -> tuple[int, int]:
-    a, b = _pair(text)
+    a, b = (integer(part) for part in text.split("-"))
     if a == b:
         raise ValueError("one contact twice")
     return a, b
@@ -187,11 +182,7 @@ VIEW: dict[str, Stored] = {
     "paused": Stored(_flag, int),
     "opened": Stored(lambda text: text.split("."), ".".join, "open"),
     "frame": Stored(integer, key="network", numbered=lambda value, _, network: network(value)),
-    "reference": Stored(integer, key="pinned", numbered=lambda value, _, network: network(value)),
-    "between": Stored(_pair, _joined, "swing", lambda pair, _, network: tuple(map(network, pair))),
     "zoom": Stored(_place, lambda place: ":".join(f"{value:g}" for value in place)),
-    "split": Stored(_flag, int),
-    "beside": Stored(number),
     "pulls": Stored(
         pulls.read, pulls.spelled, "pull",
         lambda given, contact, _: pulls.renumbered(given, contact),
@@ -211,6 +202,7 @@ VIEW: dict[str, Stored] = {
     "sampler": Stored(str),
     "axes": Stored(str),
 }  # fmt: skip
+OF_THE_PAGE = ("scene", "dark", "embed")  # read by the pages themselves
 OF_A_REPLAY = tuple(name for name, stored in VIEW.items() if stored.numbered)
 
 
@@ -269,12 +261,13 @@ def spelled(view: View, numbers: Numbers | None) -> dict[str, Any]:
 
 
 def read_view(given: Mapping[str, str], parameters: Any) -> tuple[View, list[str]]:
-    """Those of `parameters` that are in a link, parsed, and the keys of invalid values.
+    """Those of `parameters` that are in a link, parsed, and the keys of unknown and invalid ones.
 
     Values given by number become Numbered, for `fitting`.
     """
     view: View = {}
-    invalid = []
+    usual = {*VIEW, *map(key, VIEW), *OF_THE_PAGE}
+    invalid = [name for name in given if name not in usual]
     for name, stored in VIEW.items():
         spelling = key(name) if key(name) in given else name
         if name not in parameters or spelling not in given:

@@ -18,7 +18,6 @@ COLOURS = {
     "change": "change since packed",
     "mobilised": "mobilisation fₜ/(μ fₙ)",
     "extent": "interval ΔFₙ",
-    "sign": "sign of fₙ − pinned fₙ",
     "load": "limit load",
     "known": "reduction by held forces",
     "deviation": "inferred − measured fₙ",
@@ -26,7 +25,6 @@ COLOURS = {
 WIDTHS = {
     "normal": "normal force fₙ",
     "extent": "interval ΔFₙ",
-    "difference": "|fₙ − pinned fₙ|",
     "load": "limit load",
     "known": "reduction by held forces",
     "measured": "measured fₙ",
@@ -70,11 +68,6 @@ class Appearance(param.Parameterized):
     opened = param.List(default=[], item_type=str, doc="names of the panels that are open")
     pulled = param.String(doc='"pull" or "push" if that led to the network on screen')
     frame = param.Integer(default=0, doc="row of `replay` on screen; updated while it is at rest")
-    reference = param.Integer(default=0, doc="row of `replay` that is pinned, for differences")
-    split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
-    beside = param.Number(
-        default=None, bounds=(0, None), allow_None=True, doc="μ that is seen beside in its place"
-    )
     colour: Any = param.Selector(default="change", objects=list(COLOURS))
     thickness: Any = param.Selector(default="normal", objects=list(WIDTHS))
     full = param.Number(
@@ -97,9 +90,6 @@ class Looks(Appearance):
         default=None, length=3, allow_None=True,
         doc="middle and half width of what is seen, in largest radii; None: the whole packing",
     )  # fmt: skip
-    between = param.Tuple(
-        default=None, length=2, allow_None=True, doc="rows of `replay` to go to and fro between"
-    )
     pushed = param.Integer(default=None, allow_None=True, doc="contact whose push is in Push")
     drawn: Any = param.Selector(
         default="all", objects=list(DRAWN), doc="of which contacts intervals are drawn"

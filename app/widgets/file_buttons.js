@@ -39,7 +39,7 @@ export function render({ model, view }) {
     return new Blob([player().picture(caption)], { type: "image/svg+xml" })
   }
 
-  /** A movie of the animation, from the first state to the last, or once to and fro. */
+  /** A movie of the animation, from the first state to the last. */
   async function filmed(caption, button) {
     const stage = player(), { scene } = stage, layers = [scene.disks, scene.chains, scene.marks]
     const { position } = stage.replay, picture = await imageOf(drawn(caption)), height = picture.naturalHeight - SIDE
@@ -59,7 +59,7 @@ export function render({ model, view }) {
       context.textAlign = "right"
       context.fillText(stage.replay.title, WHERE[0], SIDE + WHERE[1])
       button.textContent = `recording … ${Math.round(ms / 1000)} s`
-      return !stage.playing || (stage.replay.swinging && stage.playback.turns > 1)
+      return !stage.playing
     }, "video/webm")
     stage.play(false)
     scene.view = view // as it was on screen

@@ -58,7 +58,6 @@ def palettes(dark: bool) -> dict[str, Any]:
         "known": ramp(*EXTENT[dark]),
         "change": diverging,
         "deviation": diverging,
-        "sign": [BLUE, GREY, ORANGE],
         "neutral": NEUTRAL[dark],
         "plots": {
             **{"seen": DARK, "original": ORIGINAL, "now": DOT, "states": STATES, "dots": now(dark)},

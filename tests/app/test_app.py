@@ -45,7 +45,7 @@ from app.results.selection import (
     select,
     selected,
 )
-from app.state import app_state, comparison, page_session, page_tasks, scene_links
+from app.state import app_state, page_session, page_tasks, scene_links
 from app.state.app_state import AppState
 from app.state.known import Knowledge, Statement
 from app.state.links import Numbers, fitting, link, read_link, read_view, spelled
@@ -238,7 +238,7 @@ def test_links_to_imported_packings_name_their_hash():
 
 def test_the_view_travels_with_the_link(state, visited):
     """With what single tabs show, and with its panels; a view that rests, rests again."""
-    seen = {"contact": 3, "frame": 5, "between": (2, 7), "colour": "extent", "stretch": 2.0}
+    seen = {"contact": 3, "frame": 5, "colour": "extent", "stretch": 2.0}
     seen |= {"paused": True, "opened": ["made", "check"], "sort": "extent", "pushing": "all"}
     seen |= {"axes": "stress", "zoom": (3.5, 4.25, 2.0)}
     state.looks.param.update(**seen)
@@ -273,14 +273,14 @@ def test_a_view_that_is_gone_back_to_is_settled_once_it_is_there_or_refused(stat
 
 def test_a_link_names_contacts_and_networks_by_their_own_numbers():
     pulled, held = [(2, 0.5), ("1n-3t", 0.1, 0.2)], [Statement(3, 0.25)]
-    view = {"contact": 1, "pair": (0, 2), "frame": 2, "reference": 1, "between": (0, 2)}
+    view = {"contact": 1, "pair": (0, 2), "frame": 2}
     view |= {"pulls": pulled, "known": held}
     here = SimpleNamespace(
         backbone=np.array([2, 3, 5, 9]), number=np.array([0, 1, 21]), normal=np.zeros((3, 4))
     )
     given = spelled(view, Numbers(here.backbone, here.number))
     assert given == {
-        "select": 3, "span": "2-5", "network": 21, "pinned": 1, "swing": "0-21",
+        "select": 3, "span": "2-5", "network": 21,
         "pull": "5:0.5~3n-9t:0.1:0.2", "hold": "9:0.25",
     }  # fmt: skip
     parameters = {
@@ -307,13 +307,13 @@ def test_all_networks_of_a_walk_can_be_kept_and_the_view_stays(state):
     The one that was asked for is then shown.
     """
     before, number, cells = state.replay.normal[5], state.replay.number, len(state.cells())
-    state.looks.param.update(frame=5, contact=9, reference=2)
+    state.looks.param.update(frame=5, contact=9)
     assert state.keepable and len(number) == KEPT + 1
     state.keep_all(int(number[5]) + 1)
     wait_for(state)
     looks, replay = state.looks, state.replay
     assert list(replay.number) == list(range(STATES + 1)) and not state.keepable
-    assert (looks.frame, looks.contact, looks.reference) == (number[5] + 1, 9, number[2])
+    assert (looks.frame, looks.contact) == (number[5] + 1, 9)
     np.testing.assert_allclose(replay.normal[number[5]], before, atol=1e-6)
     assert len(state.cells()) == cells and state.work.message == ""
 
@@ -362,7 +362,7 @@ def test_other_networks_keep_the_number_the_contact_and_whether_it_plays(state, 
 
 @pytest.mark.parametrize(
     "names",
-    ["contact=100000&frame=-2&between=5", "select=100000&network=-2&swing=5&span=3-3",
+    ["contact=100000&frame=-2", "select=100000&network=-2&span=3-3", "swing=2-5&beside=0.2",
      "pull=100000:1&hold=100000:1&network=31", "pull=1n-2t:3&hold=x&select=x", "push=x",
      "push=100000"],
 )  # fmt: skip
@@ -370,11 +370,11 @@ def test_views_that_make_no_sense_are_left_out_and_named_in_one_line(names, visi
     state = visited(f"mu=1&n=30&states=30&relax=nearest_piqp&colour=plaid&{names}")
     told = state.work.message.partition("no such value here: ")[2].split(", ")
     given = {part.partition("=")[0] for part in names.split("&")}
-    now = {"contact": "select", "frame": "network", "between": "swing"}  # of older links
+    now = {"contact": "select", "frame": "network"}  # of older links
     assert state.cell.mu == 1 and "colour" in told
     assert all(name in told or now[name] in told for name in given)
     looks = state.looks
-    assert (looks.contact, looks.frame, looks.colour, looks.between) == (None, 0, "change", None)
+    assert (looks.contact, looks.frame, looks.colour) == (None, 0, "change")
     assert (state.hand.pulls, state.knowledge.known, looks.pair) == ([], [], None)
 
 
@@ -573,22 +573,6 @@ def test_cancel_goes_back_to_what_a_visitor_saw_before_a_link_to_other_states(st
     wait_for(state)
     assert not state.missing and state.shown is state.replay is shown
     assert "mu=1&" in state.link() and state.source.startswith("μ = 1,")
-
-
-def test_a_friction_stands_beside_another_one_only(state):
-    """Back after a comparison once showed 0.1 beside 0.1."""
-    first = state.cell.mu
-    state.looks.split = True
-    links = []
-    state.param.watch(lambda *events: links.append(state.link()), ["selection", "cell"])
-    state.looks.param.watch(lambda event: links.append(state.link()), "beside")
-    state.choose(mu=1)
-    wait_for(state)
-    assert state.looks.beside == first and f"beside={first:g}" in state.link()
-    assert not any(f"mu={first:g}" in link and "beside" in link for link in links)
-    state.choose(mu=first)  # as Back does
-    wait_for(state)
-    assert state.looks.beside is None and state.comparison.twin is None
 
 
 def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state):
@@ -913,17 +897,7 @@ def test_a_link_alone_starts_nothing_dear_on_a_shared_server(
 @pytest.fixture
 def shared(monkeypatch):
     """A server for others than its owner."""
-    for module in (app_state, comparison):
-        monkeypatch.setattr(module, "LIMITS", Limits(seconds=60))
-
-
-def test_a_link_starts_nothing_dear_beside_another(library, shared, visited):
-    state = visited("mu=0.1&n=30&states=30&relax=nearest_piqp")
-    state.cell = state.cell._replace(selection=state.cell.selection._replace(states=19_999))
-    state.looks.split = True
-    state.looks.beside = 0.2
-    assert not state.comparison.task.running and state.looks.beside is None
-    assert "takes long to compute" in state.work.message
+    monkeypatch.setattr(app_state, "LIMITS", Limits(seconds=60))
 
 
 # Tasks

@@ -15,7 +15,6 @@ from serving import (
     expect,
     frames,
     how_it_is_made,
-    more,
     no_more,
     painted,
     picture,
@@ -299,10 +298,8 @@ DRAWN_AND_POSSIBLE = f"""(() => {{
 
 
 def test_chains_are_coloured_by_what_is_chosen(visit):
-    page = visit("?mu=0.1&n=30&states=30&relax=nearest_piqp&colour=sign&frame=6&reference=3")
+    page = visit("?mu=0.1&n=30&states=30&relax=nearest_piqp&colour=mobilised&frame=6")
     normal = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)
-    shown = scene(page, "Array.from(scene.style.bin)")
-    np.testing.assert_array_equal(shown, 1 + np.sign(normal[6] - normal[3]))
     for colour in ("change", "extent"):
         page.locator(".legend select").first.select_option(colour)
         until(page, f"scene.hand.player.look.settings.colour === '{colour}'")
@@ -450,22 +447,6 @@ def test_what_was_seen_stands_still_while_dots_move(page):
     now = column(page, "bars", "now")
     inside = [a - 1e-6 <= x <= b + 1e-6 for a, x, b in zip(seen[0], now, seen[1], strict=True)]
     assert all(inside)
-
-
-def test_to_and_fro_between_the_pinned_state_and_this_one(page):
-    page.locator("input.scrub").fill("3")
-    more(page).locator("button.pin").click()
-    page.locator("input.scrub").fill("9")
-    page.locator("button.between").click()
-    searched(page, "swing=6-22")
-    page.locator("button.play").click()
-    page.locator("input.scrub").fill("0.5")
-    mixed = np.array(scene(page, "Array.from(scene.mixed.normal)"))
-    normal = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)
-    np.testing.assert_allclose(mixed, (normal[3] + normal[9]) / 2, atol=1e-5)
-    expect(page.locator(".state")).to_contain_text("50 % of the way")
-    page.locator("button.between").click()
-    no_more(page, "swing")
 
 
 # Selecting and computing

@@ -52,10 +52,10 @@ export class Look {
 
   /** The style of these forces, for the scene. */
   of(mixed) {
-    const { model, style } = this, { thickness, reference, most, palettes, full, most_change, stretch } = model
+    const { model, style } = this, { thickness, most, palettes, full, most_change, stretch } = model
     const colour = this.before && model.colour === "change" ? "pulled" : model.colour
     // Reading the model is slow.
-    this.settings = { thickness, colour, pinned: reference * this.walk.contacts, most, full: most_change }
+    this.settings = { thickness, colour, most, full: most_change }
     this.settings.load = full ?? this.mostLoad
     const unit = this.walk.unit * this.scales.width * (stretch ?? 1)
     for (let c = 0; c < style.width.length; c++) {
@@ -74,17 +74,13 @@ export class Look {
     return style
   }
 
-  /** fₙ of the pinned state. */
-  pinned(c) { return this.walk.normal[this.settings.pinned + c] }
-
   /** The quantity shown by the width, in ⟨fₙ⟩. */
   thickness(c, { normal }) {
     const { thickness } = this.settings
     if (thickness === "extent") return this.extent[c]
     if (thickness === "load" && this.loads) return this.loads[c]
     if (thickness === "known" && this.reduction) return this.reduction[c]
-    if (thickness === "measured" && this.measured) return this.measured.normal[c] || 0
-    return thickness === "difference" ? Math.abs(normal[c] - this.pinned(c)) : normal[c]
+    return thickness === "measured" && this.measured ? this.measured.normal[c] || 0 : normal[c]
   }
 
   /** Position on the colour scale, 0 … 1. */
@@ -95,9 +91,8 @@ export class Look {
     if (colour === "deviation") return 0.5 + (this.measured.off[c] || 0) / (2 * this.scales.deviation)
     if (colour === "known") return this.reduction[c] / this.mostReduced
     if (colour === "load") return this.loads[c] / this.settings.load
-    if (colour === "pulled") return 0.5 + (normal[c] - this.before[c]) / (2 * this.settings.full)
-    if (colour === "change") return 0.5 + (normal[c] - this.walk.normal[c]) / (2 * this.settings.full)
-    return 0.5 + 0.5 * Math.sign(normal[c] - this.pinned(c))
+    const before = colour === "pulled" ? this.before : this.walk.normal
+    return 0.5 + (normal[c] - before[c]) / (2 * this.settings.full)
   }
 
   /** fₜ/(μ fₙ), or null if undefined. */

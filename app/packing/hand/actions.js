@@ -12,7 +12,6 @@ export function actions(player) {
   const { model, tell } = player
   // The networks to be played have the held forces: others are replaced first.
   const played = (action) => (given) => (model.ignoring ? tell({ sample: true }) : action(given))
-  const step = ({ swinging }) => (swinging ? 0.05 : 1)
   return {
     less: loaded(() => player.hand.nudge(-1)),
     more: loaded(() => player.hand.nudge(1)),
@@ -26,22 +25,13 @@ export function actions(player) {
       player.hand.free()
       player.toggle()
     })),
-    step: played(halted((replay) => player.show(Math.floor(replay.position + 1e-9) + step(replay)))),
-    back: played(halted((replay) => player.show(Math.ceil(replay.position - 1e-9) - step(replay)))),
+    step: played(halted((replay) => player.show(Math.floor(replay.position + 1e-9) + 1))),
+    back: played(halted((replay) => player.show(Math.ceil(replay.position - 1e-9) - 1))),
     restart: halted(() => player.show(0)),
     end: played(halted((replay) => player.show(replay.last))),
     next: loaded((replay) => player.choose(replay, 1)),
     previous: loaded((replay) => player.choose(replay, -1)),
     scrub: played(halted((replay, to) => player.show(to))),
-    pin: loaded((replay) => {
-      model.reference = replay.frame
-      model.beside = null
-    }),
-    between: loaded((replay) => {
-      player.hand.free()
-      player.between(replay)
-    }),
-    split: loaded(() => { model.split = !model.split }),
     keep: (number) => tell({ keep: number }),
     tab: (number) => tell({ tab: number }),
   }

@@ -171,7 +171,7 @@ export class Grab {
   restore() {
     const { player, replay } = this
     replay.held = null
-    player.show(replay.swinging ? replay.position : player.model.frame, false)
+    player.show(player.model.frame, false)
     this.keep(this.pulled)
   }
 

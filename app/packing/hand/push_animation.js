@@ -54,7 +54,7 @@ export class Pushed {
     if (player.playing) player.play(false)
     if (!this.held) player.say("") // about a pull
     replay.held = this.held = network
-    if (replay.position && !replay.swinging) player.show(0, false)
+    if (replay.position) player.show(0, false)
     player.look.before = this.packed.normal
     player.hand.show(network)
   }

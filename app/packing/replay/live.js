@@ -94,7 +94,6 @@ export class Live {
     if (!this.moves) this.player.play(false)
     const [left, right, low, high] = geometry.window
     this.window ??= geometry.window
-    this.player.split.show()
     geometry.window = this.window
     scene.palette ??= plain(plain(model.palettes).scene)
     scene.frozen = true

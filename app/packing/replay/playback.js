@@ -6,8 +6,6 @@ import { STILL } from "../../browser/motion.js"
 const PLOTS_MS = 30 // shortest time between two repaints of the plots while playing,
 const PLOTS_FRAMES = 1.5 // also in frames, for slow frames,
 const PLOTS_CONTACT_MS = 0.05 // and for each contact, as plots of many take longer than the packing
-const CROSSING = 20 // duration of a step between two states, relative to a normal step, so that the eye can follow,
-const LONGEST_S = 6 // with an upper limit
 const REST_MS = 400 // duration of a whole step when a pause moves to the nearest network
 
 export class Playback {
@@ -21,7 +19,6 @@ export class Playback {
     this.running = false
     this.resting = null // target of a pause, while it is being approached
     this.newest = false // whether it stays close behind the newest network of a walk in progress
-    this.turns = 0 // number of reversals during motion to and fro
     this.painted = 0 // time at which plots were painted
   }
 
@@ -33,16 +30,14 @@ export class Playback {
     if (replay && !this.running) this.settle(replay)
     stage.changed(this.running)
     if (!this.running) return
-    if (replay.atEnd && !replay.swinging) stage.show(0)
-    this.direction = 1
-    this.turns = 0
+    if (replay.atEnd) stage.show(0)
     this.before = performance.now()
     requestAnimationFrame((now) => this.tick(now))
   }
 
-  /** Rest at a named network, the nearest one, except between two compared ones. */
+  /** Rest at a named network, the nearest one. */
   settle(replay) {
-    if (replay.held || replay.swinging || !(replay.position % 1)) return
+    if (replay.held || !(replay.position % 1)) return
     replay.go(Math.round(replay.position))
     this.stage.paint()
   }
@@ -50,7 +45,7 @@ export class Playback {
   /** Stop playing at the nearest network after a transition; returns whether it is still under way. */
   pause() {
     const { replay } = this.stage
-    if (replay.held || replay.swinging || STILL.matches) { this.run(false); return false }
+    if (replay.held || STILL.matches) { this.run(false); return false }
     this.resting = Math.round(replay.position)
     return true
   }
@@ -66,8 +61,7 @@ export class Playback {
   /** Rows to advance in a time, s. */
   steps(replay, took) {
     const behind = this.newest ? (replay.last - replay.position) / CATCH_UP : 0
-    const speed = Math.max(this.stage.speed, behind)
-    return took * (replay.swinging ? Math.max(speed / CROSSING, 1 / LONGEST_S) : speed)
+    return took * Math.max(this.stage.speed, behind)
   }
 
   tick(now) {
@@ -80,19 +74,13 @@ export class Playback {
       stage.paint()
       return void again()
     }
-    if (stage.grows && replay.atEnd && !replay.swinging) return void again()
-    replay.go(replay.position + this.direction * this.steps(replay, elapsed / 1000))
-    if (replay.swinging && (replay.atEnd || replay.position <= 0)) this.turn(replay.atEnd ? -1 : 1)
+    if (stage.grows && replay.atEnd) return void again()
+    replay.go(replay.position + this.steps(replay, elapsed / 1000))
     stage.paint()
     const wait = Math.max(PLOTS_MS, PLOTS_FRAMES * elapsed, PLOTS_CONTACT_MS * replay.walk.contacts)
     if (now - this.painted > wait) stage.paintPlots(now)
-    if (replay.swinging || !replay.atEnd || stage.grows) return void again()
+    if (!replay.atEnd || stage.grows) return void again()
     this.run(false)
     stage.show(replay.last)
-  }
-
-  turn(direction) {
-    if (direction !== this.direction) this.turns++
-    this.direction = direction
   }
 }

@@ -22,32 +22,24 @@ export function networkAt({ values, normal, tangential, residual }, value) {
 }
 
 export class Replay {
-  constructor(walk, between) {
+  constructor(walk) {
     this.walk = walk
     this.mixed = { normal: new Float32Array(walk.contacts), tangential: new Float32Array(walk.contacts) }
     this.held = null // a pulled network, shown instead of the states
     this.passed = 0 // number of stored networks up to the position; the original one (frame 0) is not a state of the walk
-    this.follow(between)
+    this.position = 0
   }
 
-  /** The track: all frames, or to and fro between two. */
-  follow(between, position = 0) {
-    this.swinging = Boolean(between)
-    this.track = between ? [...between] : Array.from(this.walk.number.keys())
-    this.position = position
-  }
+  get last() { return this.walk.number.length - 1 }
 
-  get last() { return this.track.length - 1 }
+  get frame() { return Math.floor(this.position + 1e-9) }
 
-  get frame() { return this.track[Math.floor(this.position + 1e-9)] }
-
-  /** Whether the position is an end of the track. */
   get atEnd() { return this.position >= this.last }
 
   /** Frames before and after the position, and the fraction of the way. */
   get spot() {
-    const { track, position, last } = this, k = Math.min(Math.floor(position), last - 1)
-    return last < 1 ? [track[0], track[0], 0] : [track[k], track[k + 1], position - k]
+    const { position, last } = this, k = Math.min(Math.floor(position), last - 1)
+    return last < 1 ? [0, 0, 0] : [k, k + 1, position - k]
   }
 
   /** The stride of the stored networks in the walk. */
@@ -56,7 +48,7 @@ export class Replay {
     return Math.max(1, Math.round(walk.states / Math.max(1, count)))
   }
 
-  /** The track position of the network with this number, or of the nearest one. */
+  /** The position of the network with this number, or of the nearest one. */
   positionOf(number) {
     const away = Array.from(this.walk.number, (other) => Math.abs(other - number))
     return away.indexOf(Math.min(...away))
@@ -64,7 +56,7 @@ export class Replay {
 
   go(to) {
     this.position = Math.max(0, Math.min(this.last, to))
-    if (!this.swinging) this.passed = this.frame
+    this.passed = this.frame
     this.mix()
   }
 
@@ -93,13 +85,11 @@ export class Replay {
 
   /** The position in words, following the number of the network. */
   get place() {
-    const { walk, frame } = this, [a, b, portion] = this.spot
-    const name = (k) => (k ? `network ${walk.number[k]}` : `that ${walk.origin}`)
+    const { walk, frame } = this
     if (this.held) return `of ${walk.states}, ${this.held.place ?? "pulled"}`
-    if (this.swinging) return `${Math.round(100 * portion)} % of the way from ${name(a)} to ${name(b)}`
     return frame ? `of ${walk.states}` : `of ${walk.states}, ${walk.origin}`
   }
 
   /** The number of the network, and its position. */
-  get title() { return this.swinging ? this.place : `network ${this.walk.number[this.frame]} ${this.place}` }
+  get title() { return `network ${this.walk.number[this.frame]} ${this.place}` }
 }

@@ -189,21 +189,6 @@ def test_between_two_states_the_straight_line_is_shown(run):
     assert back["normal"] == NORMAL[1].tolist()
 
 
-def test_to_and_fro_between_two_states_has_a_track_of_two(run):
-    found = run(
-        "packing/replay/replay",
-        """({ Replay }, { walk }) => {
-            const replay = new Replay(walk, [0, 3])
-            replay.go(0.25)
-            const { frame, atEnd, place, mixed } = replay
-            return [frame, atEnd, place, [...mixed.normal]]
-        }""",
-        walk=WALK,
-    )
-    where = "25 % of the way from that as packed to network 3"
-    assert found == [0, False, where, (0.75 * NORMAL[0] + 0.25 * NORMAL[3]).tolist()]
-
-
 # A disk of radius 1/2 between two of radius 1, along x: contacts at −1/2 and 1/2.
 PRESSED = {
     "contacts": 2, "mu": 0.5, "friction": [0.5, 0.5], "i": [0, 1], "j": [1, 2],
@@ -215,7 +200,7 @@ PRESSED = {
 }  # fmt: skip
 MODEL = {
     "scales": {"width": 0.1, "deviation": 4.0}, "most_change": 0.5, "thickness": "normal",
-    "colour": "change", "reference": 0, "most": 3.0, "full": None, "stretch": 1.5,
+    "colour": "change", "most": 3.0, "full": None, "stretch": 1.5,
     "palettes": {"change": list(range(11)), "mobilised": list(range(11)), "neutral": "grey"},
 }  # fmt: skip
 TYPED = "Object.assign(walk, { normal: Float32Array.from(walk.normal) })"

@@ -1044,9 +1044,7 @@ def test_colours_and_widths_are_offered_once_there_is_what_they_show(state):
     def offered(*names):
         return [f'<option value="{name}"' in player.legend for name in names]
 
-    assert not any(offered("sign", "difference", "known"))
-    state.looks.reference = 2
-    assert all(offered("sign", "difference")) and not any(offered("known"))
+    assert not any(offered("known"))
     state.knowledge.hold(3, float(state.replay.normal[0, 3]), 0.1)
     assert all(offered("known"))
     state.looks.thickness = "extent"  # its name stays; the scale says which intervals

@@ -1,25 +1,19 @@
-"""In a browser: the point in force space is pulled, and two networks are seen side by side."""
+"""In a browser: the point in force space is pulled."""
 
 import numpy as np
-import pytest
 from serving import (
     MODEL,
-    ask,
     at_rest,
     column,
     expect,
     here,
     laid_out,
-    more,
-    no_more,
     normal,
     place,
     pulled,
     scene,
     searched,
-    shows,
     until,
-    zoomed,
 )
 
 # The outermost element of force space that is ever made pale.
@@ -163,109 +157,3 @@ def test_force_space_fills_while_the_walk_goes_on(visit, own_mu):
     page.get_by_role("button", name="Discard").first.click()
     until(page, "!scene.hand.player.grows")
     page.wait_for_function(f"() => {MODEL}('path')?.get_column('x')?.every(Number.isFinite)")
-
-
-def test_two_networks_side_by_side_with_one_player(visit):
-    page = visit("?frame=3&reference=1")
-    more(page).locator("button.split").click()
-    searched(page, "split=1")
-    until(page, "scene.hand.player.split.twin.painted > 0 && scene.hand.player.split.on")
-    boxes = [page.locator(f".{name}").bounding_box() for name in ("twin", "scene")]
-    assert boxes[0]["width"] == pytest.approx(boxes[1]["width"], abs=1)
-    assert boxes[0]["y"] == boxes[1]["y"] and boxes[0]["x"] < boxes[1]["x"]
-    expect(page.locator(".twin .caption")).to_contain_text("network")
-    widths = "Array.from(scene.hand.player.split.twin.style.width)"
-    pinned, contacts = scene(page, widths), scene(page, "scene.geometry.contacts")
-    normals = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(-1, contacts)
-    shown = np.argsort(pinned)
-    assert np.all(np.diff(normals[1][shown]) >= -1e-6)
-    # the view is one, and the player moves only the network that is not pinned
-    page.mouse.move(boxes[0]["x"] + 50, boxes[0]["y"] + 50)
-    zoomed(page, -200)
-    until(page, "scene.view.half < 0.49 * (scene.geometry.window[1] - scene.geometry.window[0])")
-    here, beside = scene(page, "[scene.view, scene.hand.player.split.twin.view]")
-    assert beside == pytest.approx(here)
-    page.locator("button.step").click()
-    until(page, "scene.hand.player.replay.frame === 4")
-    assert scene(page, widths) == pinned
-    more(page).locator("button.pin").click()
-    searched(page, "pinned=8")
-    until(page, f"scene.hand.player.split.twin.style.width.some((v, k) => v !== {pinned}[k])")
-    more(page).locator("button.split").click()
-    until(page, "!scene.hand.player.split.on")
-    expect(page.locator(".twin")).to_be_hidden()
-
-
-def widths(page, of):
-    return np.array(scene(page, f"Array.from({of}.style.width)"))
-
-
-def test_another_mu_comes_beside_the_packing_of_the_first(visit):
-    """Both keep their own packing; one player, one view, and a link that opens the same."""
-    page, twin = visit(), "scene.hand.player.split.twin"
-    more(page).locator("button.split").click()
-    until(page, f"scene.hand.player.split.on && {twin}.painted > 0")
-    ask(page, "1")
-    searched(page, "split=1&beside=0.1")
-    until(page, f"scene.geometry.mu === 1 && {twin}.geometry.mu === 0.1")
-    query = page.evaluate("location.search")
-    for at in (page, visit(query)):
-        until(at, f"scene.geometry.mu === 1 && {twin}.geometry?.mu === 0.1")
-        captions = [at.locator(f".{name} .caption").inner_text() for name in ("twin", "scene")]
-        assert captions == ["μ = 0.1: network 0 of 30, as packed", "μ = 1"]
-        assert scene(at, "scene.geometry.box[0]") != scene(at, f"{twin}.geometry.box[0]")
-        before = widths(at, "scene"), widths(at, twin)
-        at.locator("button.step").click()
-        until(at, "scene.hand.player.split.other.frame === 1")
-        until(at, "scene.hand.player.replay.frame === 1")
-        after = widths(at, "scene"), widths(at, twin)
-        contacts = [scene(at, f"{of}.geometry.contacts") for of in ("scene", twin)]
-        # So few disks at μ = 1 may hold in one way only: there nothing has to change.
-        for old, new, count, least in zip(before, after, contacts, (0, 1e-4), strict=True):
-            assert len(old) == len(new) == count and np.abs(old - new).max() >= least
-        normal_of_twin = np.array(scene(at, f"Array.from({twin}.geometry.normal)"))[contacts[1] :]
-        order = np.argsort(after[1])
-        assert np.all(np.diff(normal_of_twin[order]) >= -1e-6)
-        # what fills one picture fills the other, and so does a part of it
-        box = at.locator(".twin").bounding_box()
-        at.mouse.move(box["x"] + 60, box["y"] + 60)
-        zoomed(at, -300)
-        part = "{0}.view.half / ({0}.geometry.window[1] - {0}.geometry.window[0])"
-        until(at, f"{part.format('scene')} < 0.45")
-        assert scene(at, part.format(twin)) == pytest.approx(scene(at, part.format("scene")))
-    # pinned, a state of this packing is beside it again
-    more(page).locator("button.pin").click()
-    no_more(page, "beside")
-    until(page, f"{twin}.geometry.mu === 1 && scene.hand.player.split.other === null")
-    assert page.locator(".twin .caption").inner_text() == "pinned: network 1"
-
-
-def test_a_new_mu_is_seen_to_jam_beside_the_old_one(visit):
-    page = visit("?mu=0.1&n=200&states=8&relax=nearest_piqp&split=1")
-    until(
-        page,
-        "scene.geometry.states === 8 && !scene.hand.player.grows && scene.hand.player.split.on",
-    )
-    # Each picture is drawn when it arrives: a browser that is late leaves out those of a packing
-    # that has been replaced by its walk meanwhile.
-    page.locator(".scene").evaluate(
-        """e => {
-            const {live, split} = e.scene.hand.player, {receive, show} = live
-            const later = window.requestAnimationFrame
-            window.beside = []
-            live.show = (picture) => {
-                show.call(live, picture)
-                beside.push([split.on, split.other?.walk.mu, split.twin.counts.drawn])
-            }
-            live.receive = (news) => {
-                window.requestAnimationFrame = (draw) => draw(performance.now())
-                receive.call(live, news)
-                window.requestAnimationFrame = later
-            }
-        }"""
-    )
-    ask(page, "10")  # takes longest to jam
-    shows(page, 10)
-    seen = page.evaluate("beside")
-    assert seen and all(on and mu == 0.1 and drawn > 20 for on, mu, drawn in seen)
-    expect(page.locator(".twin")).to_be_visible()

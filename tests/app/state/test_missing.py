@@ -22,7 +22,7 @@ from granforce.study import kinds
 
 STATES = 5
 GONE = "0" * 64  # the hash of a packing that nobody imported
-VIEWS = "tab=export&colour=extent", "hold=2:1", "beside=0.4&select=3&network=2&pinned=1"
+VIEWS = "tab=export&colour=extent", "hold=2:1", "zoom=0:0:2&select=3&network=2"
 
 
 @pytest.fixture(scope="module")

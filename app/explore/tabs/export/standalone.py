@@ -91,7 +91,6 @@ def html(
     script, plots = components(figures)
     number = replay.number[min(view["frame"], len(replay.number) - 1)]
     frame = int(np.flatnonzero(thinned_replay.number == number)[0])
-    between = view["between"] if len(thinned_replay.normal) == len(replay.normal) else None
     same = ("contact", "colour", "thickness", "full", "stretch", "scale", "paused")
     names = set(Player.param) - set(Scripted.param)
     given = {name: Player.param[name].default for name in names}
@@ -106,7 +105,6 @@ def html(
         "legend": legend(rest) + (THRUST if given["thrust"] else ""),
         "source": source,
         "frame": frame,
-        "between": between,
         "tab": "intervals",
         "wide": True,  # force space is beside the intervals
     }

@@ -28,7 +28,7 @@ def at_rest(
 ) -> AppState:
     """A state that shows a replay by day, without computations and pulls."""
     state = AppState(library, query=None)
-    here = view | {"between": None, "tab": tab}
+    here = view | {"tab": tab}
     with discard_events(state):
         replay = replay._replace(inviting=None)  # nothing can be dragged
         state.param.update(replay=replay, shown=replay, exact=exact, loads=loads)
