@@ -195,10 +195,8 @@ def page(lasting):
     if scene(page, "scene.geometry.mu") != 0.1:
         ask(page, 0.1)
         shows(page, 0.1)
-    if page.locator("button.between.on").count():
-        page.locator("button.between").click()
     page.keyboard.press("Home")
-    more(page).locator("button.pin").click()
+    more(page)
     scene(page, "scene.reset()")
     page.mouse.move(5, 5)
     if scene(page, "scene.hand.replay.held !== null"):

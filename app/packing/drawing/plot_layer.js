@@ -110,8 +110,8 @@ export const LAYERS = {
     const held = replay.held && plots.projected(replay.mixed)
     if (replay.held && !held) return
     if (held) return spot(context, [x(held[0]), y(held[1])], plots)
-    const track = replay.track.slice(Math.max(0, Math.floor(replay.position) - TRAIL), Math.floor(replay.position) + 1)
-    const points = track.map((k) => [x(px[k]), y(py[k])])
+    const from = Math.max(0, replay.frame - TRAIL)
+    const points = Array.from({ length: replay.frame + 1 - from }, (_, k) => [x(px[from + k]), y(py[from + k])])
     points.push([x(mix(px)), y(mix(py))])
     for (let k = 1; k < points.length; k++) {
       context.globalAlpha = 0.85 * (k / points.length) ** 2

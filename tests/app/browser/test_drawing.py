@@ -42,7 +42,7 @@ def test_a_network_is_reached_by_its_number_and_the_stride_is_said(run):
     words, kept, reached, refused = run(
         "packing/replay/replay packing/player_bar",
         """({ Replay, PlayerBar }, { walk }) => {
-            const said = [], replay = new Replay(walk, null)
+            const said = [], replay = new Replay(walk)
             const scrub = (to) => { replay.go(to); bar.show(replay) }
             const bar = new PlayerBar({ scrub }, (line) => said.push(line))
             const text = () => bar.root.textContent, type = (number) => {
@@ -169,7 +169,7 @@ def test_between_two_states_the_straight_line_is_shown(run):
     there, back = run(
         "packing/replay/replay",
         """({ Replay }, { walk }) => {
-            const replay = new Replay(walk, null)
+            const replay = new Replay(walk)
             return [3, 1.3, 1].map((to) => {
                 replay.go(to)
                 const { mixed, residual, passed, place } = replay
@@ -446,7 +446,7 @@ def test_the_path_in_force_space_ends_where_the_replay_is(run):
     drawn = run(
         "packing/replay/replay packing/drawing/plot_layer",
         """({ Replay, LAYERS }, { walk }) => {
-            const replay = new Replay(walk, null), moved = []
+            const replay = new Replay(walk), moved = []
             replay.go(2.5)
             const context = {
                 arc: (x, y) => moved.push([x, y]), moveTo: (...to) => moved.push(to),
@@ -494,7 +494,7 @@ RAIL = {
 HAND = """
     const source = {}, said = []
     const player = {
-        scene: { size: 600 }, model: { scale: "mean" }, look: {}, replay: new Replay(walk, null),
+        scene: { size: 600 }, model: { scale: "mean" }, look: {}, replay: new Replay(walk),
         buttons: { part: () => source }, say() {}, tellHeld() {}, paint() {}, paintPlots() {},
         plots: { projected: ({ normal }) => [...normal], move() {} },
     }
