@@ -16,10 +16,9 @@ const touching = ({ contacts, disks }) => 2 * contacts / disks
 const prompted = ({ endless }, question) => (endless ? "Two contacts now lie in each other’s wedges: they can press on what is between them as hard as you like, since such forces cancel." : question)
 const percent = (v) => `${Math.round(100 * v)}\u00a0%`
 const raised = (v) => [...String(v)].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("")
-// Without walls: further rows of the count.
+// Without walls: a further row of the count.
 const PRESSED = [
-  ["two of them follow from the others: in the sum over all disks, forces between disks cancel, sideways and upwards", "− 2"],
-  ["one more: the pressure on all sides is given", "+ 1"],
+  ["two follow from the others, as forces between disks cancel in the sum over all disks; one more: the pressure is given", "− 2 + 1"],
 ]
 
 const tabled = (rows) => `<table>${rows.map((row) => `<tr>${row.map((cell) => `<td>${cell}</td>`).join("")}</tr>`).join("")}</table>`
@@ -49,7 +48,7 @@ function counted({ contacts, disks, equations, free }, pressed) {
   return [
     [`${contacts} contacts × 2 forces, normal and tangential`, 2 * contacts],
     [`${disks} ${disks > 1 ? "disks" : "disk"} × 3 equations: no net force sideways, none up or down, no turning`, 3 * disks],
-    ...(pressed ? [...PRESSED, [`equations: ${3 * disks} − 2 + 1`, equations]] : []),
+    ...(pressed ? PRESSED : []),
     [`free numbers: ${2 * contacts} − ${equations}`, free],
   ]
 }
@@ -76,8 +75,8 @@ export const CHAPTERS = [
   },
   {
     name: "ladder", title: "A ladder", card: "A ladder’s force on the wall (its weight = 1)", heading: "Which will it be?",
-    text: ({ mu }) => `A ladder of weight 1 leans against a rough wall on a rough floor: friction is at most μ = ${mu} times the normal force (blue wedges). A mechanics course solves it without friction at the wall. With it, four forces are unknown, two at each end, and there are three equations of balance.`,
-    ask: "The arrows show one solution. How large is the wall’s normal force?",
+    text: ({ mu }) => `A ladder of weight 1 leans against a rough wall on a rough floor: friction is at most μ = ${mu} times the normal force (blue wedges). A mechanics course solves it without friction at the wall. With it, four forces are unknown, two at each end, and there are three equations of balance. The arrows show one solution.`,
+    ask: "What is the wall’s normal force?",
     doing: () => "Drag the dot to both ends, and past them, or drag an arrow. Wherever you stop in between, the ladder is in balance.",
     verdict: ({ low, high }, prediction) => ({
       answer: `Anything from ${two(low)} to ${two(high)}.`,
@@ -109,8 +108,8 @@ export const CHAPTERS = [
     ask: "How large can the floor’s normal force become?",
     doing: () => "Drag the dot as far as it goes: right, up, left and down. What its path encloses turns blue: between two possible sets of forces, every mixture is possible too.",
     see: ({ high, weight, endless }) => [
-      `Both disks weigh ${weight}. The other ${two(high - weight)} comes from the walls, where friction pulls the wedged disks down. With more, the lower disk would slip on the floor.`,
-      `Like the largest value of any force, it is at a corner of S. Finding it is called a linear program; a computer does it for all forces of 400 disks in under a second.${PROGRAM}`,
+      `Together, the disks weigh ${weight}. The other ${two(high - weight)} comes from the walls, where friction pulls the wedged disks down. With more, the lower disk would slip on the floor.`,
+      `Like any largest force, it is reached at a corner of S. Finding one is called a linear program; a computer does it for all forces of 400 disks in under a second.${PROGRAM}`,
       prompted({ endless }, "Drag the dot along the edges: above the drawing you read what is about to slip. Then raise the friction, until S has no end here either."),
     ],
     count: (facts) => counted(facts, false),
@@ -121,7 +120,7 @@ export const CHAPTERS = [
     name: "thirteen", title: "Thirteen disks", card: "Forces to hold until no other can change", heading: "When is everything fixed?",
     text: ({ contacts, disks, mu }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. At ${contacts} contacts there are ${2 * contacts} unknown forces, and balance leaves many sets of them. Now hold one normal force at its value, then another, and so on.`,
     ask: "How many must you hold until none of the others can change?",
-    doing: () => "Click an arrow: its force is held (magenta), and all others that still can change jump. Grey ones can change no more.",
+    doing: () => "Click an arrow: its normal force is held (magenta), and all forces that still can change jump. Grey ones can change no more.",
     see: ({ contacts, free, equations }) => [
       `${free} numbers fix all ${2 * contacts} forces: S has ${free} dimensions. That is what the count gives, ${2 * contacts} unknown forces minus ${equations} equations, whichever you hold.`,
       `No screen can show ${free} dimensions. A plot of two forces is only a shadow of S, as of a body on a wall: behind each of its points lie many sets of forces.`,
@@ -136,15 +135,15 @@ export const CHAPTERS = [
     ask: "What is the largest green force that chance finds?",
     doing: ({ step }) => `Press “Walk”, or drag the slider. Each dot is ${step > 1 ? `a network, one after about every ${step} steps` : "a step"}; network 0 is the one in which the packing came to rest.`,
     see: ({ part, share, free, states, step }) => [
-      `${step > 1 ? `The line marks the largest of all ${states} networks, here between two dots. ` : ""}The walk covers ${percent(part)} of what is possible for the green force. Its dots fill ${percent(share)} of the blue area, far from the edge: to get there, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
-      `A walk shows what is typical, not what is possible. And this is only a shadow: a part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S.`,
+      `All ${states} networks cover ${percent(part)} of what is possible for the green force; the dots, ${step > 1 ? "some of them" : "all of them"}, fill ${percent(share)} of the blue area. To get to its edge, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
+      `A walk shows what is typical, not what is possible: drag the dot there by hand. And this is only a shadow: a part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S.`,
     ],
     x: { low: 0.5, high: 4, label: "green force (mean force = 1)" }, y: { low: 0, high: 3, label: "violet force" },
     experiment: Chance, options: {},
   },
   {
     name: "friction", title: "Friction", card: "Friction at which forces are least determined", heading: "Where are forces least determined?",
-    text: ({ all }) => `So far μ changed for the same disks. <b>Here each μ is a new packing</b> of ${all} disks, pressed together with this friction, and its forces walk through S, all sets of forces that hold it.`,
+    text: ({ all }) => `So far μ changed for the same disks. <b>Here each μ is a new packing</b> of ${all} disks, pressed together with this friction. A walk through its S, all sets of forces that hold it, tells how much its forces vary: how far each typically is from its mean.`,
     ask: "At which friction μ do the forces vary most?",
     doing: () => "Drag the dot along the whole axis, to both ends. Blue: how much the forces vary. Grey: how many numbers are free.",
     see: ({ rows }) => {
@@ -160,17 +159,17 @@ export const CHAPTERS = [
       [`free numbers, 2 × ${facts.contacts} − (3 × ${facts.disks} − 1)`, facts.free],
       ["forces vary by (typical deviation in the walk, mean force = 1)", percent(facts.spread)],
     ],
-    x: { low: 0.001, high: 10, log: true, label: "friction μ", symbol: "μ = " }, y: { low: 0, high: 0.2, label: "forces vary by (mean force = 1)", follows: true }, second: { low: 0, high: 400, label: "free numbers" },
+    x: { low: 0.001, high: 10, log: true, label: "friction μ", symbol: "μ = " }, y: { low: 0, high: 20, label: "forces vary by (% of the mean)", follows: true }, second: { low: 0, high: 400, label: "free numbers" },
     experiment: Friction, options: {},
   },
   {
     name: "push", title: "Why it matters", card: "Largest push before a disk moves (mean force = 1)", heading: "When does something move?",
-    text: ({ mu }) => `The packing of chapter 1, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, step by step. Many points of S would balance the push. Each step starts from the last forces and changes them as little as balance allows, as contacts that stick keep what they have.`,
+    text: ({ mu }) => `The disks of chapter 1, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, harder and harder, and the other forces have to balance the push. They do not search S for the best way: contacts that stick keep what they have, as far as balance allows.`,
     verdict: ({ limits: [first, ...others] }) => ({ answer: `It is ${two(first)}${others.length ? `; ${listed(others.map(two))} from other forces` : ""}.`, so: others.length ? "" : undefined }),
     ask: "How hard can you push before a disk moves?",
-    doing: () => "Drag the dot to the right, or an arrow away from the marked line. Blue dots: about to slip.",
+    doing: () => "Drag the dot to the right, or an arrow away from the marked line. Blue: what S allows, up to its limit load. Dots: about to slip.",
     see: ({ high, number, opened, slid, carried, moving, pushed, sinking, limit }) => [
-      moving ? `Disks start to move (arrows): ${opened} contacts open (rings), ${slid} slip (dots). ${sinking ? "Both disks move down, the lower one faster, so that the gap opens" : "The gap in the pair opens"}.`
+      moving ? `Disks start to move (arrows): in the whole packing, ${opened} contacts open (rings) and ${slid} slip (dots). ${sinking ? "Both disks of the pair move down, but along its line the lower one is faster: the gap opens" : "The gap in the pair opens"}.`
         : pushed ? `Without a push, the two disks press on each other with ${two(carried)}.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
       ...(pushed ? [`A contact that slips stays at its friction limit, and the others have to balance the rest. At ${two(high)} (end of the line) they no longer can.`] : []),

@@ -45,6 +45,7 @@ class Lesson {
 
   close() {
     this.experiment?.stop()
+    this.closing?.stop()
     this.sized.disconnect()
     this.experiment = this.mechanism = null
   }
@@ -99,7 +100,7 @@ class Lesson {
       return
     }
     if (turn !== this.openings) return experiment.stop()
-    this.main.className = ""
+    this.main.classList.remove("waiting")
     const { stops } = experiment, x = stops ? { ...chapter.x, stops, ticks: stops.filter(isDecade) } : chapter.x
     parts.text.innerHTML = chapter.text(experiment.facts)
     parts.text.append(" ", createElement("strong", { textContent: chapter.ask }))
@@ -112,11 +113,12 @@ class Lesson {
     this.ahead ??= this.fetch()
   }
 
-  /** The experiment of the first chapter, for a movie. */
+  /** The experiment of the first chapter, for pictures and a movie. */
   async pulled(host) {
     const grab = new Grab(host, { marked: "grabbed", plain: true }, () => {}, plain(this.model.palettes))
     await grab.load(this.source)
     await grab.ready()
+    grab.locked = false
     return grab
   }
 
@@ -146,7 +148,7 @@ class Lesson {
     Object.assign(this, { next, closing: last ? new ClosingPicture(after, (host) => this.pulled(host)) : null })
     const foot = createElement("div", { className: "foot" }) // always in view, as it says what to do next
     foot.append(voice, row)
-    this.main.className = "waiting"
+    this.main.className = chapter.count && !chapter.live ? "waiting counted" : "waiting"
     left.append(picture, extra)
     this.main.replaceChildren(heading, text, left, plot, knob, foot, after)
     if (chapter.live) plot.after(extra) // next to what is dragged
@@ -180,7 +182,7 @@ class Lesson {
       const { mechanism, experiment, model: { dark, palettes }, closing, progress } = this
       if (!mechanism) return
       if (experiment.draw(dark, plain(palettes))) this.paint()
-      if (mechanism.stage === 2) closing?.draw(experiment.canvas.scene, CHAPTERS.map(({ name, card, x }) => ({ name, card, x, ...progress.of(name) })), palette(dark))
+      if (mechanism.stage === 2) closing?.draw(CHAPTERS.map(({ name, card, x }) => ({ name, card, x, ...progress.of(name) })), palette(dark), plain(palettes))
     })
   }
 }

@@ -22,26 +22,37 @@ const address = ({ host, hostname, pathname }) => (hostname === "localhost" ? "g
 export class ClosingPicture {
   /** pulled(host): a promise of the experiment of DARED, drawn in this element. */
   constructor(host, pulled) {
-    this.pulled = pulled
     const canvas = this.canvas = createElement("canvas", { width: WIDE, height: HIGH, role: "img" })
     const keep = () => canvas.toBlob((blob) => save(blob, "granforce-lesson.png"))
-    host.prepend(canvas, button("Save as a movie", (pressed) => this.film(pressed)), " ", button("Save as a picture", keep))
+    const hidden = createElement("div", { className: "hidden", inert: true, style: `width: ${WIDE}px; height: ${WIDE}px` })
+    host.prepend(canvas, button("Save as a movie", (pressed) => this.film(pressed)), " ", button("Save as a picture", keep), hidden)
+    pulled(hidden).then((grab) => {
+      this.grab = grab
+      if (this.given) this.draw(...this.given)
+    }, () => {}) // its chapter says why
   }
 
-  /** scene: the packing on screen; chapters: [{name, card, x: axis, prediction, answer: [low, high]}]; look: as from palette. */
-  draw(scene, chapters, look) {
-    Object.assign(this, { chapters, look })
+  stop() { this.grab?.stop() }
+
+  /** chapters: [{name, card, x: axis, prediction, answer: [low, high]}]; look: as from palette; palettes: of packings. */
+  draw(chapters, look, palettes) {
+    this.given = [chapters, look, palettes]
+    const { grab } = this, key = JSON.stringify(this.given)
+    if (!grab || key === this.key) return
+    this.key = key
     const g = this.canvas.getContext("2d"), { left, right, top, step } = RAIL, write = writer(g), place = (x, value) => new Scale(x, left, right).px(Math.min(x.high, Math.max(x.low, value)))
     const answers = chapters.filter(({ prediction = null, answer }) => answer && prediction !== null), hits = answers.filter(({ x, prediction, answer }) => isRight(x, prediction, answer))
     const bottom = PACKING.top + PACKING.high
-    this.packing(g, scene, PACKING.top + (PACKING.high - WIDE) / 2, WIDE)
+    this.pull(grab.facts.high)
+    this.packing(g, PACKING.top + (PACKING.high - WIDE) / 2, WIDE)
     g.fillStyle = look.paper
     g.fillRect(0, 0, WIDE, PACKING.top)
     g.fillRect(0, bottom, WIDE, HIGH)
-    write("How far can forces go?", left, 52, look.ink, "bold 38px")
-    write(`What I said, and what is possible: ${hits.length} of ${answers.length} right`, left, 90, look.ink, "23px")
-    write("○ my prediction", left, bottom + 40, look.hand, "21px")
-    write("● the answer", left + 200, bottom + 40, look.cold, "21px")
+    write("How far can one force go?", left, 52, look.ink, "bold 38px")
+    write(`Pulled to its end: ${grab.changesTo(grab.network)} others follow, and no disk moves.`, left, 90, look.ink, "23px")
+    write("○ I said", left, bottom + 40, look.hand, "21px")
+    write("● possible", left + 130, bottom + 40, look.cold, "21px")
+    write(`${hits.length} of ${answers.length} right`, right + 20, bottom + 40, look.ink, "bold 21px")
     chapters.forEach((chapter, k) => {
       const { card, x, prediction = null, answer } = chapter, y = top + step * k
       write(card, left, y - 14, look.ink, "21px")
@@ -62,36 +73,40 @@ export class ClosingPicture {
     this.canvas.ariaLabel = `Your predictions. ${named.join("; ")}`
   }
 
-  /** A packing as on screen, on an empty picture: this far below its upper edge, and this wide. */
-  packing(g, { disks, chains, marks }, edge, side) {
-    g.fillStyle = this.look.paper
+  /** Give the force a value, at once. */
+  pull(value) {
+    const { grab, given: [,, palettes] } = this
+    grab.drag(value)
+    grab.shown = null
+    grab.draw(null, palettes)
+  }
+
+  /** The packing on an empty picture: this far below its upper edge, and this wide. */
+  packing(g, edge, side) {
+    g.fillStyle = this.given[1].paper
     g.fillRect(0, 0, g.canvas.width, g.canvas.height)
+    const { disks, chains, marks } = this.grab.canvas.scene
     for (const { canvas } of [disks, chains, marks]) g.drawImage(canvas, 0, edge, side, side)
   }
 
   /** Record a force that is pulled to both its ends, and save it. */
   async film(pressed) {
     const { textContent: words } = pressed, { wide, high } = MOVIE, canvas = createElement("canvas", { width: wide, height: high }), g = canvas.getContext("2d")
-    const host = createElement("div", { className: "hidden", style: `width: ${wide}px; height: ${wide}px` })
     Object.assign(pressed, { disabled: true, textContent: "Recording …" })
-    pressed.after(host)
-    const pulled = await this.pulled(host), movie = await recorded(canvas, (ms) => this.frame(g, pulled, ms))
-    pulled.stop()
-    host.remove()
+    const movie = await recorded(canvas, (ms) => this.frame(g, ms))
     Object.assign(pressed, { disabled: false, textContent: words })
     save(movie, `granforce-lesson.${movie.type.match(/\w+$/)}`)
   }
 
   /** A frame of the movie; returns whether it is the last one. */
-  frame(g, pulled, ms) {
-    const { look, chapters } = this, { x, prediction } = chapters.find(({ name }) => name === DARED), { wide, high, edge } = MOVIE, write = writer(g)
-    const { start, network, facts: { low, high: most, contacts } } = pulled, up = ms < UP_MS
+  frame(g, ms) {
+    const { grab, given: [chapters, look] } = this, { x, prediction } = chapters.find(({ name }) => name === DARED), { wide, high, edge } = MOVIE, write = writer(g)
+    const { start, facts: { low, high: most, contacts } } = grab, up = ms < UP_MS
     const part = gently(Math.min(1, up ? ms / UP_MS : (ms - UP_MS) / DOWN_MS))
-    pulled.drag(up ? start + part * (most - start) : most + part * (low - most))
-    pulled.draw(null, pulled.palettes)
-    this.packing(g, pulled.canvas.scene, edge, wide)
+    this.pull(up ? start + part * (most - start) : most + part * (low - most))
+    this.packing(g, edge, wide)
     write(`One of ${contacts} forces is pulled. No disk moves.`, 24, 46, look.ink, "bold 28px")
-    write(`${pulled.changesTo(network)} other forces follow.`, 24, high - 62, look.cold, "bold 32px")
+    write(`${grab.changesTo(grab.network)} other forces follow.`, 24, high - 62, look.cold, "bold 32px")
     if (ms > UP_MS + DOWN_MS) write(`How far can it go${prediction === null ? "" : `? I said ${told(x, prediction)} times the mean. And you`}? ${address(window.location)}`, 24, high - 24, look.ink, "20px")
     return ms > UP_MS + DOWN_MS + ASKS_MS
   }

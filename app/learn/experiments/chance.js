@@ -1,7 +1,8 @@
-// The random walk, in the plane of two forces, and the part of S there that it reaches.
+// The random walk, in the plane of two forces, and the part of S there that it reaches. Then the hand goes on.
 
 import { STILL } from "../../browser/motion.js"
 import { unflat } from "../../browser/canvas_paths.js"
+import { networkAt } from "../../packing/replay/replay.js"
 import { PackingExperiment } from "./packing_experiment.js"
 
 const SECONDS = 8 // for the whole walk
@@ -10,7 +11,8 @@ export class Chance extends PackingExperiment {
   async load(source) {
     const [packing, { outline, share }] = await Promise.all([source.get("packing", "0.1"), source.get("shadow")])
     const { grabbed: contact, other } = packing, force = (row, c) => packing.normal[row * packing.contacts + c]
-    Object.assign(this, { packing, contact, share, steered: false, outline: unflat([...outline]), row: 0 })
+    Object.assign(this, { packing, contact, other, share, steered: false, outline: unflat([...outline]), row: 0 })
+    source.get("rail", "grabbed").then((rail) => { this.rail = rail; this.stepTo(this.row) }, () => {})
     this.network = this.before = this.asPacked(packing)
     this.canvas.show(packing, null)
     this.canvas.scene.pair = [contact, other]
@@ -46,6 +48,14 @@ export class Chance extends PackingExperiment {
     this.row = row
     this.network = normal.subarray(row * contacts, (row + 1) * contacts)
     this.answered ||= row === this.drawn.length - 1
+    this.steered = this.answered && Boolean(this.rail)
+    this.changed()
+  }
+
+  /** By hand, the force goes to both its ends. */
+  drag(x) {
+    const { values } = this.rail
+    this.network = networkAt(this.rail, Math.min(values.at(-1), Math.max(values[0], x))).normal
     this.changed()
   }
 
@@ -64,8 +74,8 @@ export class Chance extends PackingExperiment {
   finish() { this.stepTo(this.drawn.length - 1) }
 
   get picture() {
-    const path = this.drawn.slice(0, this.row + 1)
-    return { now: path.at(-1), words: "", exact: this.outline, seen: path, dots: path, filled: true, walk: true }
+    const { network, contact, other } = this, path = this.drawn.slice(0, this.row + 1)
+    return { now: [network[contact], network[other]], words: "", exact: this.outline, seen: path, dots: path, filled: true, walk: true }
   }
 
   stop() {

@@ -12,7 +12,7 @@ const nearest = (list, mu) => list.reduce((one, other) => (Math.abs(Math.log(oth
 export class Friction extends PackingExperiment {
   async load(source) {
     const { mu, spread, free } = await source.get("curve")
-    Object.assign(this, { stops: [...mu], spreads: [...spread], free: [...free], packings: new Map(), visited: new Set() })
+    Object.assign(this, { stops: [...mu], spreads: [...spread].map((part) => 100 * part), free: [...free], packings: new Map(), visited: new Set() })
     this.value = nearest(this.stops, START)
     const fetched = this.stops.map((one) => source.get("packing", String(one)).then((packing) => this.packings.set(one, packing)))
     this.fetched = Promise.all(fetched)

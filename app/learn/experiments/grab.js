@@ -19,7 +19,11 @@ export class Grab extends PackingExperiment {
     this.tangential = packing.tangential.subarray(0, packing.contacts)
     this.start = this.value
     this.canvas.show(packing, contact)
-    this.fetched = source.get("rail", marked).then((rail) => { this.rail = this.first = { ...rail, contact } })
+    this.fetching = true
+    this.fetched = source.get("rail", marked).then((rail) => {
+      Object.assign(this, { rail: { ...rail, contact }, first: rail, fetching: false })
+      if (this.wanted) this.pull(...this.wanted)
+    })
   }
 
   /** The force of the marked line. */
@@ -58,7 +62,7 @@ export class Grab extends PackingExperiment {
   /** Give a contact the force value(its rail), as far as possible, once its rail is there. */
   async pull(contact, value) {
     this.wanted = [contact, value]
-    if (this.fetching) return
+    if (this.fetching) return this.rail ? undefined : this.say("finding how far it can be pulled …")
     if (this.rail.contact !== contact) {
       this.fetching = true
       try {
@@ -77,12 +81,15 @@ export class Grab extends PackingExperiment {
     this.seen = [Math.min(this.value, seen?.[0] ?? start), Math.max(this.value, seen?.[1] ?? start)]
     if (contact === this.contact) {
       this.answered ||= !locked && high - now < FOUND * (high - low)
-      this.say(locked && asked !== now ? "It goes further. First predict how far." : `${this.changesTo(normal)} other forces follow`)
+      this.say(locked && asked !== now ? "It goes further. First predict how far." : `${this.changesTo(normal)} other forces follow, by more than ${CHANGED}`)
     } else this.say(`this line: ${now.toFixed(2)}, possible ${rail.lower.toFixed(2)} to ${rail.upper.toFixed(2)}`)
     this.changed()
   }
 
-  takes(contact) { return Boolean(this.rail) && (!this.locked || contact === this.contact) }
+  takes(contact) { return !this.locked || contact === this.contact }
+
+  /** Contacts at their limits, once there is an answer. */
+  get limited() { return this.answered ? super.limited : null }
 
   take(contact) {
     this.held = contact

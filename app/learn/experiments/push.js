@@ -87,15 +87,15 @@ export class Push extends PackingExperiment {
     return moving ? Uint8Array.from(opened, (open, c) => (open ? OPENS : slid[c])) : super.limited
   }
 
-  /** The force of the line, against the push, and, once disks moved, S on it. */
+  /** The force of the line against the push, and what S allows. */
   get picture() {
-    const { value, answered, limits, network, path: { values, normal, band, contact, limit }, packing: { contacts } } = this
+    const { value, locked, limits, network, path: { values, normal, band, contact, limit }, packing: { contacts } } = this
     const rows = Array.from({ length: band.length / 3 }, (_, k) => band.subarray(3 * k, 3 * k + 3)).filter((row) => row.every(Number.isFinite)) // not certified: next to the limit load
     const edge = (d) => rows.map((row) => [row[0], row[d]])
     const now = [value, network[contact]], bound = { value: limit, words: `limit load ${limit.toFixed(2)}` }
     return {
-      now, filled: true, curve: true, exact: answered ? [...edge(1), ...edge(2).reverse()] : [], seen: [...Array.from(values, (push, k) => [push, normal[k * contacts + contact]]).filter(([push]) => push < value), now],
-      lines: answered ? [bound, ...limits.slice(1)] : [],
+      now, filled: true, curve: true, exact: locked ? [] : [...edge(1), ...edge(2).reverse()], seen: [...Array.from(values, (push, k) => [push, normal[k * contacts + contact]]).filter(([push]) => push < value), now],
+      lines: locked ? [] : [bound, ...limits.slice(1)],
     }
   }
 

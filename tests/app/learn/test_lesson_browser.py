@@ -241,6 +241,11 @@ def test_a_prediction_is_not_moved_by_a_grasp_and_stays_within_the_possible(open
     page.mouse.move(x - 500, y)
     page.mouse.up()
     assert float(marker.get_attribute("aria-valuenow")) == pytest.approx(start, abs=1e-6)
+    # After the walk the hand goes on to the end.
+    page.get_by_role("button", name="That is my prediction").click()
+    page.get_by_role("slider", name="walk").press("End")
+    press(page, RIGHT)
+    assert float(dot(page).get_attribute("aria-valuenow")) == pytest.approx(high, abs=0.006)
 
 
 def test_without_a_stored_packing_the_lesson_begins_with_the_ladder(opening, tmp_path):
@@ -340,7 +345,7 @@ def test_the_same_disks_are_pushed_from_other_forces_and_every_limit_stays(openi
     press(page, RIGHT)
     expect(page.locator("figure.plot svg")).to_have_css("touch-action", "pan-y")
     page.get_by_text("Disks start to move").wait_for()
-    page.get_by_text("the lower one faster").wait_for()
+    page.get_by_text("the lower one is faster").wait_for()
     assert page.locator("path.exact").get_attribute("d")  # S, once disks moved
     expect(page.get_by_role("button", name="Your predictions: 7 chapters to go")).to_be_disabled()
     allowed = page.locator("figure").get_by_text("limit load")
@@ -352,7 +357,7 @@ def test_the_same_disks_are_pushed_from_other_forces_and_every_limit_stays(openi
     page.get_by_text("Push again").wait_for()
     assert float(dot(page).get_attribute("aria-valuenow")) == 0
     # An arrow follows the hand.
-    x, y, along = page.locator(".scene").evaluate(ARROW)
+    x, y, along = page.locator(".picture .scene").evaluate(ARROW)
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x + 10 * along[0], y + 10 * along[1], steps=3)
