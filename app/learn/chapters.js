@@ -68,7 +68,7 @@ export const CHAPTERS = [
     doing: () => "Drag the dot to the right, or the marked line upwards, as far as it goes.",
     see: ({ start, opened, sliding, changed, contacts }) => [
       `It began at ${two(start)}. ${changed} of ${contacts - 1} other forces have changed by more than a tenth of the mean, and no disk has moved: a photograph would be the same. It ends where ${sliding} contacts are about to slip (dots) and ${opened} about to open (rings).`,
-      "So the packing does not tell its forces. How can that be? A ladder, one disk, two disks, thirteen: then you will know. Pull other lines, too.",
+      "So a packing alone does not fix its forces. How can that be? A ladder, one disk, two disks, thirteen: then you will know. Pull other lines, too.",
     ],
     x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: null,
     experiment: Grab, options: { marked: "grabbed" },

@@ -160,24 +160,21 @@ export class Buttons {
   /** Whether a pulled network is on screen. */
   tellHeld(held) { this.root.classList.toggle("held", held) }
 
-  /** keepable: seconds for computing the networks that were not stored; 0: they cannot be computed. */
-  tellTrack(replay, keepable) { this.bar.showTrack(replay, keepable) }
-
   /** The numbers of the position. */
   read(replay) {
-    const { walk, passed, residual } = replay
+    const { walk, frame, residual } = replay
     const form = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits) : "–")
     const texts = {
       origin: walk.origin,
       apart: `${Math.round(100 * replay.apart)} %`,
-      eta1: form(walk.eta1[passed], 3),
-      eta2: form(walk.eta2[passed], 3),
-      eta3: form(0.15 * walk.eta3[passed], 3),
-      upto: `${passed} of ${walk.number.length - 1}`,
+      eta1: form(walk.eta1[frame], 3),
+      eta2: form(walk.eta2[frame], 3),
+      eta3: form(0.15 * walk.eta3[frame], 3),
+      upto: `${frame} of ${walk.number.length - 1}`,
       residual: residual === 0 ? "0" : Number.isFinite(residual) ? residual.toExponential(0) : "–",
     }
     for (const [name, text] of Object.entries(texts)) this.part(name).textContent = text
-    this.root.classList.toggle("ran", passed > 1 && !replay.held)
+    this.root.classList.toggle("ran", frame > 1 && !replay.held)
     this.root.classList.toggle("other", replay.apart > 0)
     this.bar.show(replay)
     this.count()

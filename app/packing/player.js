@@ -175,7 +175,7 @@ class Player {
     if (!this.playing) this.paintPlots()
   }
 
-  tellTrack() { this.buttons.tellTrack(this.replay, this.grows ? 0 : this.model.keepable) }
+  tellTrack() { this.buttons.bar.showTrack(this.replay, this.grows ? 0 : this.model.keepable) }
 
   get speed() { return this.buttons.bar.speed }
 

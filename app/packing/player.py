@@ -45,8 +45,9 @@ STATES |= {"eta1": Array, "eta2": Array, "eta3": Array}
 
 # Parameters of the view that the player also knows, and those that it may change.
 APPEARANCE = sorted(set(Appearance.param) - {"name"})
-SHARED = ("contact", "frame", "colour", "thickness", "full", "stretch", "paused")
-SHARED += ("opened", "pulled")
+SHARED = (
+    "contact", "frame", "colour", "thickness", "full", "stretch", "paused", "opened", "pulled",
+)  # fmt: skip
 
 SCALES = {"width": CHAIN_WIDTH, "deviation": FULL_DEVIATION}
 

@@ -87,7 +87,7 @@ export class PlayerBar {
     this.rate.textContent = words
   }
 
-  /** Show another replay: its length, and whether the omitted networks can be computed. */
+  /** Show another replay: its length. keepable: seconds for computing the networks that were not stored; 0: they cannot be computed. */
   showTrack(replay, keepable) {
     this.replay = replay
     this.root.classList.remove("empty")

@@ -60,17 +60,17 @@ export class Plots {
   /** Intervals, and the measures of a walk in progress. */
   show(replay, scale) {
     this.replay = replay
-    const bars = this.find("bars"), growth = this.find("growth"), { walk, passed } = replay
+    const bars = this.find("bars"), growth = this.find("growth"), { walk, frame } = replay
     if (bars?.get_column("at")) this.showBars(bars, replay, scale)
     if (!walk.numbers || !(growth?.get_column("state")?.length >= walk.number.length)) return
     let most = 0
     for (const name of ["eta1", "eta2", "eta3"]) {
       const column = growth.get_column(name), factor = name === "eta3" ? 0.15 : 1, all = walk[name]
-      for (let k = 0; k <= passed; k++) {
+      for (let k = 0; k <= frame; k++) {
         column[k] = factor * all[k]
         if (column[k] > most) most = column[k]
       }
-      column.fill?.(NaN, passed + 1)
+      column.fill?.(NaN, frame + 1)
     }
     this.reach(most)
     this.changed(growth, "growth")

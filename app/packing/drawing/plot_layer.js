@@ -87,12 +87,12 @@ export const LAYERS = {
     context.fill()
   },
 
-  growth(context, { x, y }, plots, { passed }) {
+  growth(context, { x, y }, plots, { frame }) {
     const growth = plots.find("growth"), state = growth.get_column("state")
     for (const name of ["eta1", "eta2", "eta3"]) {
       context.strokeStyle = plots.colours[name]
       context.lineWidth = 2
-      const eta = growth.get_column(name), count = Math.min(passed + 1, state.length)
+      const eta = growth.get_column(name), count = Math.min(frame + 1, state.length)
       context.beginPath()
       for (let k = 1; k < count; k++) context.lineTo(x(state[k]), y(eta[k]))
       context.stroke()

@@ -26,12 +26,12 @@ export class Replay {
     this.walk = walk
     this.mixed = { normal: new Float32Array(walk.contacts), tangential: new Float32Array(walk.contacts) }
     this.held = null // a pulled network, shown instead of the states
-    this.passed = 0 // number of stored networks up to the position; the original one (frame 0) is not a state of the walk
     this.position = 0
   }
 
   get last() { return this.walk.number.length - 1 }
 
+  /** The number of stored networks up to the position; the original one (frame 0) is not a state of the walk. */
   get frame() { return Math.floor(this.position + 1e-9) }
 
   get atEnd() { return this.position >= this.last }
@@ -56,7 +56,6 @@ export class Replay {
 
   go(to) {
     this.position = Math.max(0, Math.min(this.last, to))
-    this.passed = this.frame
     this.mix()
   }
 

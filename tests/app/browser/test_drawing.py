@@ -165,17 +165,17 @@ WALK = {
 
 
 def test_between_two_states_the_straight_line_is_shown(run):
-    """Forces, and the number of networks passed, at 1.3 of the track and back at 1."""
+    """Forces, and the number of networks up to there, at 1.3 and back at 1."""
     there, back = run(
         "packing/replay/replay",
         """({ Replay }, { walk }) => {
             const replay = new Replay(walk)
             return [3, 1.3, 1].map((to) => {
                 replay.go(to)
-                const { mixed, residual, passed, place } = replay
+                const { mixed, residual, frame, place } = replay
                 return {
                     normal: [...mixed.normal], tangential: [...mixed.tangential],
-                    passed, residual, place,
+                    frame, residual, place,
                 }
             }).slice(1)
         }""",
@@ -185,7 +185,7 @@ def test_between_two_states_the_straight_line_is_shown(run):
     np.testing.assert_allclose(there["normal"], normal, rtol=1e-6)
     np.testing.assert_allclose(there["tangential"], tangential, rtol=1e-6)
     assert (there["residual"], there["place"]) == (0.2, "of 3")
-    assert back["passed"] == 1  # the original is no state
+    assert back["frame"] == 1  # the original is no state
     assert back["normal"] == NORMAL[1].tolist()
 
 
