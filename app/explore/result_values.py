@@ -74,7 +74,7 @@ def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]
     unknowns = 2 * summary["contacts"] - summary.get("tangential_unknowns", 0)
     h, phi = summary["dimension"], summary["packing_fraction"]
     free, held = f"{h} = {unknowns} − {unknowns - h}", state.knowledge.whole
-    if held is not None and not state.elsewhere:
+    if held is not None and state.narrows and not state.elsewhere:
         free = "{} → {} given the held forces".format(*held.dimension)
     each = worded(state.shown, "contacts per disk")
     return [

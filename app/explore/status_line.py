@@ -96,12 +96,12 @@ def facts(state: AppState) -> Iterator[str]:
 
 
 def bounds(state: AppState) -> str:
-    """The number of certified exact bounds, their accuracy, and whether held forces narrow them."""
+    """The number of certified exact bounds, their accuracy, and whether they ignore held forces."""
     exact, known, whole = state.exact, "", state.knowledge.whole
     if exact is None:
         return "exact bounds: not computed"
     if whole is not None:
-        exact, known = whole.after, " given the held forces"
+        exact = whole.after
     elif state.knowledge.known:
         known = " without the held forces"
     gap = exact["interval_gap"].values

@@ -4,7 +4,6 @@ import { button, createElement } from "../browser/dom.js"
 
 const ICONS = { back: "M18 5v14L8 12z", play: "M7 4v16l13-8z", pause: "M6 5h4v14H6zM14 5h4v14h-4z", step: "M6 5v14l10-7z" }
 const OUTSIDE = ({ states, origin }) => `Networks have the numbers 1 to ${states}; 0 is the network ${origin}.`
-const NEAREST = (requested, shown) => `${requested} is not stored: showing ${shown}.`
 
 const icon = (name) => `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${ICONS[name]}"/></svg>`
 
@@ -29,7 +28,7 @@ export class PlayerBar {
     this.speedInput = createElement("input", { className: "speed", type: "range", min: 0, max: 6, step: 0.25, value: 0, ariaLabel: "speed" })
     this.rate = createElement("span", { className: "rate" })
     this.stored = createElement("span", { className: "stored", role: "status" })
-    this.keep = button("Keep all", () => actions.keep(this.missed?.requested ?? this.replay.walk.number[this.replay.frame]), { className: "keep", title: "compute and store every network" })
+    this.keep = button("Keep all", () => actions.keep(this.replay.walk.number[this.replay.frame]), { className: "keep", title: "compute and store every network" })
     this.playButton = iconButton("play", "space", () => actions.play())
     const along = createElement("label", { className: "at" }), speed = createElement("label", { title: "networks per second" })
     const more = createElement("span", { className: "more" })
@@ -52,7 +51,7 @@ export class PlayerBar {
   /** Rows per second. */
   get speed() { return 2 ** Number(this.speedInput.value) }
 
-  /** Go to the network whose number was typed, or to the nearest stored one. */
+  /** Go to the network whose number was typed; if it is not stored, all are computed first, or the nearest one is shown. */
   go() {
     const requested = Number(this.number.value), { replay } = this
     if (!replay) return
@@ -63,15 +62,9 @@ export class PlayerBar {
     }
     const position = replay.positionOf(requested), shown = walk.number[position]
     this.actions.scrub(position)
-    this.number.value = shown
-    this.missed = shown === requested ? null : { requested, shown }
-    this.showStored()
-  }
-
-  /** Beside the button that stores all networks: which ones are stored, or that the requested one is not. */
-  showStored() {
-    const { missed, replay: { stride, walk } } = this, usual = stride > 1 ? `every ${ordinal(stride)} of ${walk.states} is stored` : ""
-    this.stored.textContent = missed ? NEAREST(missed.requested, missed.shown) : usual
+    if (shown === requested) return
+    if (this.keepable) this.actions.keep(requested)
+    this.say(`${requested} is not stored${this.keepable ? ": computing all networks" : `: showing ${shown}`}.`)
   }
 
   showPlaying(playing) {
@@ -94,8 +87,8 @@ export class PlayerBar {
     const { last, stride } = replay
     this.scrub.max = last
     this.root.classList.toggle("single", replay.walk.free === 0)
-    this.missed = null
-    this.showStored()
+    this.keepable = keepable
+    this.stored.textContent = stride > 1 ? `every ${ordinal(stride)} of ${replay.walk.states} is stored` : ""
     this.keep.hidden = !(stride > 1 && keepable)
     this.keep.textContent = keepable >= 1 ? `Keep all (about ${duration(keepable)})` : "Keep all"
     this.showRate()
@@ -105,10 +98,6 @@ export class PlayerBar {
   show(replay) {
     this.scrub.value = replay.position
     this.place.textContent = this.place.title = replay.place
-    if (this.missed && this.missed.shown !== replay.walk.number[replay.frame]) {
-      this.missed = null
-      this.showStored()
-    }
     if (!this.number.matches(":focus")) this.number.value = replay.walk.number[replay.frame]
   }
 }

@@ -50,8 +50,8 @@ PLANES = {
 }
 # Parts of the study: how their networks were found.
 SAMPLERS = {
-    "walk": "nearest-network walk",
     "sweeps_1e-3": "the paper’s walk, to 10⁻³",
+    "walk": "nearest-network walk",
     "uniform": "uniform in S",
 }
 SCALES = {"mean": "mean force = 1", "own": "force as packed = 1"}
@@ -97,7 +97,7 @@ class Looks(Appearance):
     sort: Any = param.Selector(
         default="original", objects=list(SORTS), doc="order of the intervals"
     )
-    sampler: Any = param.Selector(default="walk", objects=list(SAMPLERS), doc="of Figure 1")
+    sampler: Any = param.Selector(default="sweeps_1e-3", objects=list(SAMPLERS), doc="of Figure 1")
     axes: Any = param.Selector(default="pair", objects=list(PLANES), doc="of force space on screen")
     dark = param.Boolean(doc="theme")
 

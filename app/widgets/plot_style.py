@@ -21,6 +21,7 @@ STATES = "#3d8bd4"  # small dots, visible by day and by night
 EDGE = "#8fa1b5"
 SERIES = ("#0072b2", "#d55e00", "#009e73")  # Okabe and Ito
 PALE, DARK, DOT, ORIGINAL = "#a9cdee", "#2b74b8", "#b5236b", "#e69f00"
+LOST = "#dd6fa5"  # of an interval, by held forces
 
 # The page's font, which canvases do not inherit.
 FONT = 'Inter, Roboto, "Helvetica Neue", sans-serif'

@@ -118,7 +118,7 @@ def show(
     Returns
     -------
     View
-        The page.
+        The page: `known` are the forces that are held on it, `address` is its link.
 
     Raises
     ------

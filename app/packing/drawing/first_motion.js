@@ -4,8 +4,8 @@
 import { arrow, circle } from "../../browser/canvas_paths.js"
 import { extremes } from "./displacement.js"
 
-const LONGEST = 3 // mean radii, the arrow of the fastest disk
-const SHORTEST = 0.3 // mean radii; shorter arrows are not drawn
+const LONGEST = 4 // mean radii, the arrow of the fastest disk
+const SHORTEST = 0.6 // mean radii; shorter arrows are not drawn
 export const OPENS = 2 // value of a contact that opens; 1: it slides
 const RING = 0.3, SPOT = 0.16, LEAST_PX = 2 // radii of the marks, largest radii
 
@@ -34,9 +34,9 @@ export function drawMotion(context, scene, { field, contacts }) {
     const u = per * field[2 * grain[k]], v = per * field[2 * grain[k] + 1], long = Math.hypot(u, v)
     if (long < SHORTEST * mean) continue
     const from = [x[k] + scene.shift(grain[k], 0), y[k] + scene.shift(grain[k], 1)]
-    arrow(context, from, [from[0] + u, from[1] + v], Math.min(0.35 * unit, long / 2), 0.5)
+    arrow(context, from, [from[0] + u, from[1] + v], Math.min(0.35 * unit, long / 2.5), 0.5)
   }
-  for (const [wide, paint] of [[0.26, palette.halo], [0.11, palette.strong]]) {
+  for (const [wide, paint] of [[0.2, palette.halo], [0.09, palette.strong]]) {
     context.lineWidth = Math.max(wide * unit, (10 * wide) / scale)
     context.strokeStyle = paint
     context.stroke()

@@ -44,26 +44,28 @@ def test_a_network_is_reached_by_its_number_and_the_stride_is_said(run):
         """({ Replay, PlayerBar }, { walk }) => {
             const said = [], replay = new Replay(walk)
             const scrub = (to) => { replay.go(to); bar.show(replay) }
-            const bar = new PlayerBar({ scrub }, (line) => said.push(line))
+            const keep = (number) => keeps.push(number), keeps = []
+            const bar = new PlayerBar({ scrub, keep }, (line) => said.push(line))
             const text = () => bar.root.textContent, type = (number) => {
                 bar.number.value = number
                 bar.number.dispatchEvent(new Event("change"))
                 return [bar.number.value, replay.frame, said.pop() ?? "", bar.stored.textContent]
             }
-            bar.showTrack(replay, true)
+            bar.showTrack(replay, 4)
             const words = text(), kept = !bar.keep.hidden
             const reached = [type("41"), type("12"), type("0")]
             const refused = [type("61"), type("four")]
-            bar.showTrack(replay, false)
-            return [words, [kept, !bar.keep.hidden], reached, refused]
+            bar.showTrack(replay, 0)
+            return [words, [kept, !bar.keep.hidden, keeps], [...reached, type("12")], refused]
         }""",
         walk=walk,
     )
     assert "every 20th of 60 is stored" in words and "1 stored network/s" in words
-    assert kept == [True, False]
+    assert kept == [True, False, [12]]
     every = "every 20th of 60 is stored"
     assert reached[0] == ["41", 3, "", every] and reached[2] == ["0", 0, "", every]
-    assert reached[1] == ["21", 2, "", "12 is not stored: showing 21."]
+    assert reached[1] == ["21", 2, "12 is not stored: computing all networks.", every]
+    assert reached[3] == ["21", 2, "12 is not stored: showing 21.", every]
     assert all(found[:2] == ["0", 0] and "1 to 60" in found[2] for found in refused)
 
 

@@ -37,6 +37,7 @@ from app.explore.tabs.export import files, standalone
 from app.explore.tabs.force_space import force_space as plane_view
 from app.explore.tabs.friction import friction as statistics_view
 from app.explore.tabs.friction.claims import SAMPLERS
+from app.explore.tabs.friction.study_figures import BELOW
 from app.explore.tabs.intervals import intervals as intervals_view
 from app.explore.tabs.intervals.growth_figure import GrowthFigure
 from app.explore.tabs.intervals.known_forces import Known
@@ -628,19 +629,23 @@ def test_figures_of_the_paper_are_there_at_once_with_the_packing_on_screen(state
 
 def test_figure_1_is_drawn_from_the_networks_chosen(state):
     view = friction_tab(state)
-    state.looks.sampler = "sweeps_1e-3"
-    wait_for(state, lambda: view.indeterminacy.sampler == "sweeps_1e-3")
-    points = statistics.means(study_data.in_force_space("sweeps_1e-3"), "eta2")
-    drawn = drawn_points(view.figures[0])
-    assert all(np.isclose(drawn, value).any() for mu, value, _ in points if mu > 0)
-    assert not len(view.indeterminacy.etas.marks.data["x"])  # the packing's networks are others
-    assert "the paper’s walk" in view.first.object and "sampler=sweeps_1e-3" in state.link()
+    for sampler, words in (("sweeps_1e-3", "the paper’s walk"), ("walk", "nearest-network walk")):
+        state.looks.sampler = sampler
+        wait_for(state, lambda name=sampler: view.indeterminacy.sampler == name)
+        points = statistics.means(study_data.in_force_space(sampler), "eta2")
+        drawn = drawn_points(view.figures[0])
+        assert all(np.isclose(drawn, value).any() for mu, value, _ in points if mu > 0)
+        assert words in view.first.object
+        assert ("sampler=walk" in state.link()) == (sampler == "walk")
+    top = view.indeterminacy.etas.figure.y_range.end
+    assert all(value < BELOW * top for mu, value, _ in points if 0 < mu < 1e-3)  # under the inset
 
 
 def test_what_is_said_of_friction_is_made_from_the_study(state):
     view = friction_tab(state)
     for name, words in (("eta1", "η₁"), ("eta2", "η₂"), ("eta3", "0.15 η₃ seen")):
-        points = statistics.means(study_data.rows("walk"), name, factor=0.15 ** (name == "eta3"))
+        walks = study_data.in_force_space("sweeps_1e-3")
+        points = statistics.means(walks, name, factor=0.15 ** (name == "eta3"))
         mu, *largest = max(points, key=lambda point: point[1])
         shown = re.search(rf"{words} ([\d.]+) ± ([\d.]+)", view.first.object)
         assert [float(number) for number in shown.groups()] == pytest.approx(largest, abs=6e-5)

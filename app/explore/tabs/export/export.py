@@ -135,16 +135,13 @@ FILES = {
 }
 KINDS = {key: kind for group in GROUPS.values() for key, kind in group.items()}
 HELP = """
-Each file shows the current view, including pulled and held forces; a push ends with its tab, but
-the motion that it caused can be saved here. Playing pauses. Pictures have a
-colour bar, scales and a caption. The movie plays from the first network to the last, at the
-player's speed. The HTML page needs no server and no network connection.
-Contacts: one row each, with disks, forces as packed and on screen, the range over the networks and,
-if computed, the exact bounds. Forces are in mean forces, as on screen; the first lines explain the
-columns. Networks: the packing and <b>all</b> networks with their measures, units and parameters;
-those that were not stored are computed again. To save a plot as PNG or SVG, use the buttons above
-it. The address of the page reopens this view; <code>granforce walk packing.npz</code> continues
-with the packing.
+Each file shows the current view, including pulled and held forces. A push ends with its tab, but
+its motion can be saved here. Pictures have a colour bar, scales and a caption. The movie plays from
+the first network to the last, at the player's speed. The HTML page needs no server. Contacts: a row
+each, with disks, forces as packed and on screen, the range over the networks and, if computed, the
+exact bounds, in mean forces. Networks: the packing and <b>all</b> networks, with measures, units
+and parameters. To save a plot, use the buttons at its right, which appear on hover. The address of
+the page reopens this view.
 """
 
 

@@ -8,6 +8,7 @@ import panel as pn
 from granforce.records import InputError
 
 from ....background.jobs import Job, reading
+from ....background.notifications import observe
 from ....results import planes, progress_feed
 from ....results.planes import Outlined, Plane
 from ....results.replays import Replay
@@ -43,6 +44,7 @@ class View(TabView):
         self.looks.param.watch(self._span, "contact")
         self.looks.param.watch(self._title, "dark")
         self.looks.param.watch(self._fit, "wide")
+        observe(self._explain, state.knowledge, "narrowed", "known")
         self.shown: tuple[Any, ...] | None = None
         self.outlined: Outlined | None = None
         self._fit()
@@ -170,7 +172,14 @@ class View(TabView):
         self.details.object = self.finding.object = ""
         self.outlined = None
         self._show_others()
-        self.lead.object = sentences.lead(replay, plane, outlined=False)
+        self._explain()
+
+    def _explain(self, *events: Any) -> None:
+        """Say what is drawn, and how many dimensions held forces leave."""
+        replay, plane, whole = self.state.shown, self.state.plane, self.state.knowledge.whole
+        if replay is not None and plane is not None:
+            left = whole.dimension[1] if whole is not None and self.state.narrows else None
+            self.lead.object = sentences.lead(replay, plane, self.outlined is not None, left)
 
     def _title(self, *events: Any) -> None:
         if self.state.plane is not None and self.state.shown is not None:
@@ -194,7 +203,7 @@ class View(TabView):
         self.drawing.outline(outlined)
         reach = 1.05 * float(outlined.outer[:, 0].max())
         self.drawing.draw_cone(outlined.plane, replay.summary["mu"], reach)
-        self.lead.object = sentences.lead(replay, outlined.plane, outlined=True)
+        self._explain()
         self._tell(outlined)
 
     def _show_others(self) -> None:

@@ -28,8 +28,8 @@ COMPUTED = (
 )
 
 
-def lead(replay: Replay, plane: Plane, outlined: bool) -> str:
-    """The meaning of the marks in the plot, as HTML."""
+def lead(replay: Replay, plane: Plane, outlined: bool, left: int | None = None) -> str:
+    """The meaning of the marks in the plot, as HTML; left: dimensions given the held forces."""
     marks = [
         mark(STATES, "a dot: a whole force network", "50%"),
         mark(DOT, "the one in the packing: drag it", "50%"),
@@ -38,7 +38,8 @@ def lead(replay: Replay, plane: Plane, outlined: bool) -> str:
     if outlined:
         marks.insert(0, mark(PALE, f"all possible values ({term('exact', 'exact')})"))
     h = replay.summary["dimension"]
-    shadow = f" {term('s', 'S')} has {term('h', f'{h} dimensions')}; this is its shadow on two"
+    count = f"{h} dimensions" + (f", {left} with the held forces" if left is not None else "")
+    shadow = f" {term('s', 'S')} has {term('h', count)}; this is its shadow on two"
     shadow += " of the forces." if plane.components else "."
     return HEADING + ". ".join(marks) + "." + (shadow if h > 2 else "")
 

@@ -17,7 +17,7 @@ Points = Sequence[tuple[float, float, float]]  # x, y and standard error
 COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
 MARKERS = ("circle", "square", "triangle", "diamond", "inverted_triangle")
 DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10]
-HERE = "this packing"
+HERE = "on screen"
 HERE_COLUMNS = ("x", "y", "label", "colour", "marker")
 
 

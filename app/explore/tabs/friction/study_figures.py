@@ -18,7 +18,7 @@ from ....widgets.hints import term
 from ....widgets.parts import figure
 from ....widgets.plot_style import DOT, legend_above
 from ...result_values import with_error
-from .against_friction import COLOURS, MARKERS, AgainstFriction, Line
+from .against_friction import COLOURS, MARKERS, AgainstFriction, Line, shown
 
 MEASURES = (("eta1", "η₁", 1.0), ("eta2", "η₂", 1.0), ("eta3", "0.15 η₃ seen", 0.15))
 # Parts of the study, and their labels.
@@ -27,7 +27,9 @@ COMPARED |= {"exact": "exact", "sweeps_1e-4": "seen: the paper’s walk, to 10�
 CORRELATED = ("walk", "uniform", "exact")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
 BINS = 30
-ROOM = 1.5  # of the largest η: leaves room for the inset above the rising curve
+ROOM = 1.3  # of the largest η
+# The room that the inset leaves: part of the axis of μ above it, and part of that of η below it.
+ABOVE, BELOW = 0.47, 0.4
 
 
 class Indeterminacy:
@@ -41,10 +43,9 @@ class Indeterminacy:
             for name, label, factor in MEASURES
         ]
         self.etas = AgainstFriction(
-            "indeterminacy", "indeterminacy η", self.lines, height=340, min_border_left=62
+            "indeterminacy", "indeterminacy η", self.lines, height=372, min_border_left=62
         )
-        most = max((y + error for line in self.lines for _, y, error in line.points), default=1.0)
-        self.etas.figure.y_range = DataRange1d(start=0, end=ROOM * most)
+        self.etas.figure.y_range = DataRange1d(start=0, end=_top(self.lines))
         self.z = AgainstFriction(
             "coordination", "z", [Line("z", statistics.means(walks, "coordination"))], height=130,
             min_border_left=28, min_border_right=6, tools="", toolbar_location=None,
@@ -53,9 +54,8 @@ class Indeterminacy:
         _small(self.z.figure)
 
     def mark(self, current: Row) -> None:
-        """Mark the packing on screen, whose networks are those of a nearest-network walk."""
-        if self.sampler == "walk":
-            self.etas.mark(current["mu"], *(factor * current[name] for name, _, factor in MEASURES))
+        """Mark the packing and the networks on screen."""
+        self.etas.mark(current["mu"], *(factor * current[name] for name, _, factor in MEASURES))
         self.z.mark(current["mu"], current["coordination"])
 
     def sentence(self) -> str:
@@ -85,6 +85,16 @@ class Indeterminacy:
             f"μ = {PAPERS_PEAK:g}; parabolas fitted to these points have them at {min(ours):.2f} "
             f"to {max(ours):.2f} (95 %: {least:.2f} to {most:.2f}). "
         )
+
+
+def _top(lines: Sequence[Line]) -> float:
+    """The end of the axis of η: above all points, and those under the inset are below it."""
+    points = np.concatenate([shown(line.points).T for line in lines]) if lines else np.empty((0, 3))
+    if not len(points):
+        return 1.0
+    high, place = points[:, 1] + points[:, 2], np.log(points[:, 0])
+    left = place <= place.min() + ABOVE * np.ptp(place)
+    return float(max(ROOM * high.max(), high[left].max() / BELOW))
 
 
 def _maxima(lines: Iterable[Line]) -> str:

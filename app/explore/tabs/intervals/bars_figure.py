@@ -10,7 +10,7 @@ from granforce.types import Floats, Integers
 from ....packing.legend import Bounds
 from ....results.replays import Replay
 from ....widgets.parts import MOVES, figure, on_tap
-from ....widgets.plot_style import DARK, DOT, ORIGINAL, PALE, hover, now
+from ....widgets.plot_style import DARK, DOT, LOST, ORIGINAL, PALE, hover, now
 
 COLUMNS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
 COLUMNS += ("whole_low", "whole_high")  # exact intervals without known forces
@@ -50,11 +50,9 @@ class BarsFigure:
         self.layers = [
             fig.vbar(
                 x="rank", bottom=f"{of}low", top=f"{of}high", width=1, source=self.bars,
-                line_color=None, fill_color=colour, fill_alpha=alpha,
+                line_color=None, fill_color=colour,
             )
-            for of, colour, alpha in (
-                ("whole_", PALE, 0.3), ("exact_", PALE, 1.0), ("", DARK, 1.0),
-            )
+            for of, colour in (("whole_", LOST), ("exact_", PALE), ("", DARK))
         ]  # fmt: skip
         _, exact, sampled = self.layers
         sampled.name = "seen"  # see plot_layer.js

@@ -23,7 +23,7 @@ from ....widgets.parts import (
     plotted,
     question,
 )
-from ....widgets.plot_style import DARK, ORIGINAL, PALE, now
+from ....widgets.plot_style import DARK, LOST, ORIGINAL, PALE, now
 from .bars_figure import BarsFigure
 from .contact_table import Contacts
 from .growth_figure import GrowthFigure
@@ -144,12 +144,12 @@ def sentence(
     narrowed, held, parts = state.knowledge.narrowed, state.knowledge.known, []
     if exact:
         words = f"pale: {term('exact', state.bounds)}"
-        if narrowed:
-            words += "; faintest: without them"
-        else:
+        if not narrowed:
             every = "network at this pressure" if replay.pressed else "admissible network"
             words += " without the held forces" if held else f", every {every}"
         parts.append(mark(PALE, words))
+        if narrowed:
+            parts.append(mark(LOST, "pink: lost by holding them"))
     elif state.work.arriving is not None:
         parts.append(mark(PALE, "pale: exact, as bounds are found"))
     count = replay.summary["states"]
