@@ -1,4 +1,4 @@
-// A list of scenes: first those of this page, then those that open the other one.
+// A list of scenes: first those of this page, then those that open the other one; and what to try after the lesson.
 
 import { lastPacking } from "./local_storage.js"
 
@@ -15,3 +15,13 @@ export function sceneQuery(scene, mu) {
   const last = scene === "imported" ? lastPacking() : ""
   return last || `?${new URLSearchParams(mu === null ? { scene } : { scene, mu })}`
 }
+
+/** What to try after the lesson, by name: the query of a page, a title, and a question, which that page shows. */
+export const ONWARDS = {
+  stones: ["scene=stones", "An arch of stones", "Change the friction: from which μ on do three stones stand as an arch?"],
+  disks: ["scene=own", "Build your own", "Add a third disk: how many numbers can three disks leave free?"],
+  hold: ["", "400 disks", "Click a line and press H, to hold its force: which others does it bind?"],
+}
+
+/** The question with which a page was opened; empty without one. */
+export const asked = () => ONWARDS[new URLSearchParams(window.location.search).get("asked")]?.[2] ?? ""

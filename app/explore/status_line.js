@@ -3,6 +3,7 @@
 import { ask, plain } from "../browser/send.js"
 import { button, createElement } from "../browser/dom.js"
 import { knows, remember } from "../browser/local_storage.js"
+import { asked } from "../browser/scene_options.js"
 
 const NEW = "learn" // name under which a browser remembers that the line for new visitors was closed
 const LATE_MS = 200 // after which a computation is shown; shorter ones would flicker
@@ -47,7 +48,8 @@ export function render({ model, view }) {
     if (!plain(model.progress).words || !task.hidden) { clearTimeout(late); show() } else late ||= setTimeout(show, LATE_MS)
   }
 
-  if (!knows(NEW)) root.append(invitation())
+  const question = asked()
+  if (question || !knows(NEW)) root.append(invitation(question))
   model.on("facts", show)
   model.on("failed", replace)
   model.on("progress", follow)
@@ -55,10 +57,11 @@ export function render({ model, view }) {
   return root
 }
 
-function invitation() {
+/** Where new visitors can begin, or the question that the lesson ended with. */
+function invitation(question) {
   const paragraph = createElement("p", { className: "new" })
   const link = createElement("a", { href: "?learn", textContent: "Learn" })
   const close = button("×", () => { remember(NEW); paragraph.remove() }, { ariaLabel: "Close permanently" })
-  paragraph.append("New to this? ", link, " starts with one force", close)
+  paragraph.append(...(question ? [question] : ["New to this? ", link, " starts with one force"]), close)
   return paragraph
 }

@@ -36,13 +36,6 @@ export const SUMMARY = `<ul>
   <li><b>More friction</b>: first S is wider, then it loses dimensions.</li>
   <li><b>Limit load</b>: S ends. Disks move before.</li></ul>`
 
-/** What to try next: the query of a page, its name, and a question. */
-export const ONWARDS = [
-  ["?scene=arch", "An arch of stones", "From which friction on does it stand?"],
-  ["?scene=own", "Build your own", "How many numbers can three disks leave free?"],
-  ["", "Explore 400 disks", "Hold one force. Which others does it bind?"],
-]
-
 /** The count of free numbers, line by line, with the sum in the last row. */
 function counted({ contacts, disks, equations, free }, pressed) {
   return [
@@ -131,7 +124,7 @@ export const CHAPTERS = [
   },
   {
     name: "chance", title: "A random walk", card: "Largest force that a random walk finds (mean = 1)", heading: "How far does chance go?",
-    text: ({ low, high, states, all, disks, contacts, free }) => `The ${all} disks again, ${all - disks} without forces: 2 × ${contacts} forces − (3 × ${disks} − 1) equations = ${free} free numbers. The force you pulled, now green, goes from ${two(low)} to ${two(high)}; blue: with a violet one, a shadow of S. Chance walks through S in ${states} steps: each changes all forces at random, then restores balance.`,
+    text: ({ high, states, all, disks, contacts, free }) => `The ${all} disks again, ${all - disks} without forces: 2 × ${contacts} forces − (3 × ${disks} − 1) equations = ${free} free numbers. The force you pulled is green; it goes up to ${two(high)}. Blue: all it can be together with a violet force, a shadow of S. Chance walks through S in ${states} steps: each changes all forces at random, then restores balance.`,
     ask: "What is the largest green force that chance finds?",
     doing: ({ step }) => `Press “Walk”, or drag the slider. Each dot is ${step > 1 ? `a network, one after about every ${step} steps` : "a step"}; network 0 is the one in which the packing came to rest.`,
     see: ({ part, share, free, states, step }) => [
@@ -143,14 +136,14 @@ export const CHAPTERS = [
   },
   {
     name: "friction", title: "Friction", card: "Friction at which forces are least determined", heading: "Where are forces least determined?",
-    text: ({ all }) => `So far μ changed for the same disks. <b>Here each μ is a new packing</b> of ${all} disks, pressed together with this friction. A walk through its S, all sets of forces that hold it, tells how much its forces vary: how far each typically is from its mean.`,
+    text: ({ all, packings }) => `So far μ changed for the same disks. <b>Here each μ is a new packing</b>, one of ${packings}, of ${all} disks, pressed together with this friction. A walk through its S, all sets of forces that hold it, tells how much its forces vary: how far each typically is from its mean.`,
     ask: "At which friction μ do the forces vary most?",
     doing: () => "Drag the dot along the whole axis, to both ends. Blue: how much the forces vary. Grey: how many numbers are free.",
     see: ({ rows }) => {
       const most = rows.reduce((one, other) => (other.spread > one.spread ? other : one)), first = rows[0], last = rows.at(-1)
       return [
-        `With little friction many numbers are free, ${first.free} at μ = ${first.mu}, but each has little room: forces vary by ${percent(first.spread)}. More friction gives them room: ${percent(most.spread)} at μ = ${most.mu}, the most of these ${rows.length === 6 ? "six" : rows.length} packings.`,
-        `But with more friction a packing stands on fewer contacts, ${two(touching(last))} per disk instead of ${two(touching(first))}. With three per disk nothing would be free: 3N unknown forces, 3N equations. So S first grows wider and then loses its dimensions.`,
+        `With little friction many numbers are free (grey), ${first.free} at μ = ${first.mu}, but each has little room: forces vary by ${percent(first.spread)} (blue). More friction gives them room: ${percent(most.spread)} at μ = ${most.mu}, the most of these ${rows.length === 6 ? "six" : rows.length} packings.`,
+        `But with more friction a packing stands on fewer contacts, ${two(touching(last))} per disk instead of ${two(touching(first))}. With three per disk nothing would be free. So S first grows wider and then loses its dimensions.`,
       ]
     },
     live: true,
@@ -164,15 +157,15 @@ export const CHAPTERS = [
   },
   {
     name: "push", title: "Why it matters", card: "Largest push before a disk moves (mean force = 1)", heading: "When does something move?",
-    text: ({ mu }) => `The disks of chapter 1, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, harder and harder, and the other forces have to balance the push. They do not search S for the best way: contacts that stick keep what they have, as far as balance allows.`,
+    text: ({ mu }) => `The disks of chapter 1, μ = ${mu}, with another line marked: its two disks press on each other. Now they are pushed apart, harder and harder, and the other forces have to balance the push. Nothing searches S for the forces that hold longest: contacts that stick keep their forces, and change them only as far as balance demands.`,
     verdict: ({ limits: [first, ...others] }) => ({ answer: `It is ${two(first)}${others.length ? `; ${listed(others.map(two))} from other forces` : ""}.`, so: others.length ? "" : undefined }),
     ask: "How hard can you push before a disk moves?",
     doing: () => "Drag the dot to the right, or an arrow away from the marked line. Blue: what S allows, up to its limit load. Dots: about to slip.",
-    see: ({ high, number, opened, slid, carried, moving, pushed, sinking, limit }) => [
-      moving ? `Disks start to move (arrows): in the whole packing, ${opened} contacts open (rings) and ${slid} slip (dots). ${sinking ? "Both disks of the pair move down, but along its line the lower one is faster: the gap opens" : "The gap in the pair opens"}.`
+    see: ({ high, number, opened, slid, carried, moving, pushed, limit }) => [
+      moving ? `Disks start to move (arrows): in the whole packing, ${opened} contacts open (rings) and ${slid} slip (dots).`
         : pushed ? `Without a push, the two disks press on each other with ${two(carried)}.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
-      ...(pushed ? [`A contact that slips stays at its friction limit, and the others have to balance the rest. At ${two(high)} (end of the line) they no longer can.`] : []),
+      ...(pushed ? [`A contact that slips stays at its friction limit, and the others have to balance the rest. At ${two(high)} they no longer can.`] : []),
       `Other forces in S (blue) would balance a push up to ${two(limit)}, the limit load, but sliding disks do not search for them. So statics alone promises too much${pushed ? `, here ${percent(limit / high - 1)}` : ""}, and limits of slopes and foundations are often computed from statics.`,
     ],
     x: { low: 0, high: 2, label: "push (mean force = 1)" }, y: { low: 0, high: 1.5, label: "force of the line", follows: true },

@@ -5,9 +5,9 @@ import { copyButton } from "../browser/clipboard.js"
 import { button, createElement } from "../browser/dom.js"
 import { keepChapter } from "../browser/local_storage.js"
 import { STILL } from "../browser/motion.js"
-import { sceneQuery } from "../browser/scene_options.js"
+import { ONWARDS, sceneQuery } from "../browser/scene_options.js"
 import { plain } from "../browser/send.js"
-import { CHAPTERS, ONWARDS, SUMMARY } from "./chapters.js"
+import { CHAPTERS, SUMMARY } from "./chapters.js"
 import { palette } from "./drawing/palette.js"
 import { ClosingPicture, DARED } from "./drawing/closing_picture.js"
 import { Grab } from "./experiments/grab.js"
@@ -140,7 +140,7 @@ class Lesson {
     turn.append(next)
     row.append(turn)
     const { pathname } = window.location, { scene } = chapter.options
-    const links = ONWARDS.map(([query, title, question]) => `<a href="${pathname}${query}"><b>${title} ▸</b> ${question}</a>`).join("")
+    const links = Object.entries(ONWARDS).map(([name, [query, title, question]]) => `<a href="${pathname}?${query}&asked=${name}"><b>${title} ▸</b> ${question}</a>`).join("")
     const onwards = last ? `${SUMMARY}<div class="onwards">${links}</div>` : scene ? `<a href="?scene=${scene}">More with this scene</a>` : ""
     const after = createElement("div", { className: "after", innerHTML: onwards })
     if (last || chapter.name === DARED) after.append(copyButton("Challenge a friend: copy the link", () => this.challenge))

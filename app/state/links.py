@@ -202,7 +202,7 @@ VIEW: dict[str, Stored] = {
     "sampler": Stored(str),
     "axes": Stored(str),
 }  # fmt: skip
-OF_THE_PAGE = ("scene", "dark", "embed")  # read by the pages themselves
+OF_THE_PAGE = ("scene", "dark", "embed", "asked")  # read by the pages themselves
 OF_A_REPLAY = tuple(name for name, stored in VIEW.items() if stored.numbered)
 
 

@@ -51,8 +51,8 @@ export class ClosingPicture {
     write("How far can one force go?", left, 52, look.ink, "bold 38px")
     write(`Pulled to its end: ${grab.changesTo(grab.network)} others follow, and no disk moves.`, left, 90, look.ink, "23px")
     write("○ I said", left, bottom + 40, look.hand, "21px")
-    write("● possible", left + 130, bottom + 40, look.cold, "21px")
-    write(`${hits.length} of ${answers.length} right`, right + 20, bottom + 40, look.ink, "bold 21px")
+    write("● the answer", left + 130, bottom + 40, look.cold, "21px")
+    write(`${hits.length} of ${answers.length} close`, right + 20, bottom + 40, look.ink, "bold 21px")
     chapters.forEach((chapter, k) => {
       const { card, x, prediction = null, answer } = chapter, y = top + step * k
       write(card, left, y - 14, look.ink, "21px")

@@ -55,6 +55,6 @@ export class AgainstFriction extends SceneExperiment {
 
   get picture() {
     const { answered, band, visited, at: [mu, force] } = this
-    return { now: [mu, force], words: `μ = ${mu.toFixed(2)}`, seen: this.between(...visited), exact: answered ? this.between(0, band.at(-1).mu) : [], endless: true, filled: true }
+    return { now: [mu, force], words: answered ? "" : `μ = ${mu.toFixed(2)}`, seen: this.between(...visited), exact: answered ? this.between(0, band.at(-1).mu) : [], endless: true, filled: true }
   }
 }

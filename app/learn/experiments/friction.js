@@ -51,7 +51,7 @@ export class Friction extends PackingExperiment {
 
   get facts() {
     const { packing, packings } = this
-    return { ...this.counted(packing), spread: packing.spread, rows: [...packings.values()].sort((one, other) => one.mu - other.mu) }
+    return { ...this.counted(packing), spread: packing.spread, packings: this.stops.length, rows: [...packings.values()].sort((one, other) => one.mu - other.mu) }
   }
 
   /** Move to the nearest stop, past all stops on the way. */

@@ -37,7 +37,13 @@ export class Grab extends PackingExperiment {
   }
 
   /** A promise: dragging has to wait for the first rail. */
-  ready() { return this.fetched }
+  ready() {
+    this.say("")
+    return this.fetched
+  }
+
+  /** Predictions are not below what the hand has seen. */
+  get possible() { return [this.seen?.[1] ?? this.start, Infinity] }
 
   /** Number of other forces that change from the first network to this one. */
   changesTo(network) {

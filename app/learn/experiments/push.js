@@ -53,11 +53,10 @@ export class Push extends PackingExperiment {
   get moving() { return this.canvas.motion !== null }
 
   get facts() {
-    const { path: { contact, opened, slid, number, displacement }, packing, limits, moving, before, pushed } = this, count = (mask) => mask.reduce((sum, v) => sum + v, 0)
-    const sinking = [packing.i[contact], packing.j[contact]].every((disk) => displacement[2 * disk + 1] < 0)
+    const { path: { contact, opened, slid, number }, packing, limits, moving, before, pushed } = this, count = (mask) => mask.reduce((sum, v) => sum + v, 0)
     return {
       ...this.counted(packing), number, moving, high: this.limit, carried: before[contact], opened: count(opened), slid: count(slid),
-      pushed, sinking, limit: this.path.limit, limits: limits.map(({ value }) => value),
+      pushed, limit: this.path.limit, limits: limits.map(({ value }) => value),
     }
   }
 
@@ -94,7 +93,7 @@ export class Push extends PackingExperiment {
     const edge = (d) => rows.map((row) => [row[0], row[d]])
     const now = [value, network[contact]], bound = { value: limit, words: `limit load ${limit.toFixed(2)}` }
     return {
-      now, filled: true, curve: true, exact: locked ? [] : [...edge(1), ...edge(2).reverse()], seen: [...Array.from(values, (push, k) => [push, normal[k * contacts + contact]]).filter(([push]) => push < value), now],
+      now, words: `push ${value.toFixed(2)}`, filled: true, curve: true, exact: locked ? [] : [...edge(1), ...edge(2).reverse()], seen: [...Array.from(values, (push, k) => [push, normal[k * contacts + contact]]).filter(([push]) => push < value), now],
       lines: locked ? [] : [bound, ...limits.slice(1)],
     }
   }

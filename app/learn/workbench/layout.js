@@ -1,6 +1,7 @@
 // The empty layout of the workbench.
 
 import { lastChapter } from "../../browser/local_storage.js"
+import { asked } from "../../browser/scene_options.js"
 
 /** Its HTML; most: μ at the end of the slider. */
 export function layout(most) {
@@ -18,7 +19,7 @@ export function layout(most) {
         <button type="button" class="soft save" title="This scene as a file for granforce: gf.load_packing">Download data</button>
       </span>
     </div>
-    <p class="says" aria-live="polite"></p><button type="button" class="soft mend" hidden></button>
+    <p class="asked">${asked()}</p><p class="says" aria-live="polite"></p><button type="button" class="soft mend" hidden></button>
     <div class="own" hidden></div>
     <div class="pair">
       <figure><figcaption class="legend"></figcaption>
