@@ -124,7 +124,7 @@ export const CHAPTERS = [
   },
   {
     name: "chance", title: "A random walk", card: "Largest force that a random walk finds (mean = 1)", heading: "How far does chance go?",
-    text: ({ high, states, all, disks, contacts, free }) => `The ${all} disks again, ${all - disks} without forces: 2 × ${contacts} forces − (3 × ${disks} − 1) equations = ${free} free numbers. The force you pulled is green; it goes up to ${two(high)}. Blue: all it can be together with a violet force, a shadow of S. Chance walks through S in ${states} steps: each changes all forces at random, then restores balance.`,
+    text: ({ high, states, all, disks, contacts, free }) => `The ${all} disks again, ${all - disks} without forces: 2 × ${contacts} forces − (3 × ${disks} − 1) equations = ${free} free numbers. The force you pulled, green, goes up to ${two(high)}. Blue: all it can be together with a violet force, a shadow of S. Chance walks through S in ${states} steps: each changes all forces at random, then restores balance.`,
     ask: "What is the largest green force that chance finds?",
     doing: ({ step }) => `Press “Walk”, or drag the slider. Each dot is ${step > 1 ? `a network, one after about every ${step} steps` : "a step"}; network 0 is the one in which the packing came to rest.`,
     see: ({ part, share, free, states, step }) => [

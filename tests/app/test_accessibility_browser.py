@@ -48,7 +48,7 @@ def test_no_tab_has_a_serious_finding(visit, dark):
         page.get_by_role("tab", name=title).click()
         page.locator(f".in-{tab} *").filter(visible=True).first.wait_for()
         if tab == "statistics":
-            page.get_by_text("Maxima, nearest-network walk").wait_for()
+            page.get_by_text("Maxima, the paper’s walk").wait_for()
         page.wait_for_function("() => !document.querySelector('.pn-loading')")
         assert findings(page) == [], title
 

@@ -307,7 +307,7 @@ def test_legends_lie_where_no_curve_goes(lasting, query):
 
 def test_ticks_of_friction_stand_apart(lasting):
     page = lasting("?tab=statistics")
-    page.get_by_text("Maxima, nearest-network walk").wait_for()
+    page.get_by_text("Maxima, the paper’s walk").wait_for()
     page.wait_for_function(
         "() => [...Bokeh.documents[0].all_models]"
         ".some((m) => m.type === 'LogAxis' && m.axis_label === 'friction μ')"
@@ -328,7 +328,7 @@ def test_ticks_of_friction_stand_apart(lasting):
 
 def test_friction_shows_figures_1_4_and_6_and_the_claims_with_verdicts(lasting):
     page = lasting("?tab=statistics")
-    for words in ("Maxima, nearest-network walk", "How long are the intervals seen?"):
+    for words in ("Maxima, the paper’s walk", "How long are the intervals seen?"):
         page.get_by_text(words).wait_for()
     page.get_by_text("Are the strong contacts the undetermined ones?").wait_for()
     page.wait_for_function(f"() => {MODEL}('indeterminacy_marks')?.get_length() === 3")

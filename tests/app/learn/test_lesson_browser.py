@@ -319,7 +319,7 @@ def test_a_friend_sends_a_challenge(opening, lesson):
     page.get_by_text("Your friend: 3.21; your friend was closer.").wait_for()
     page.locator("figure").get_by_text("your friend").wait_for()
     page.get_by_role("button", name="Challenge a friend").click()
-    assert page.evaluate("navigator.clipboard.readText()").endswith("?learn=four-hundred&said=2.00")
+    assert page.evaluate("navigator.clipboard.readText()").endswith("?learn=four-hundred&said=4.54")
 
 
 def test_the_numbers_under_the_friction_plot_are_those_of_the_packing_on_screen(opening, lesson):
