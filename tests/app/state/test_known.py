@@ -171,7 +171,7 @@ def test_a_push_shows_no_held_forces(state):
     held(state, 4)
     given = player.exact["high"]
     assert player.most == most and "(scale of the free forces)" in legend(state)
-    assert "given the held" in bounds(state)
+    assert "without the held" not in bounds(state)
     state.looks.tab = "perturb"
     assert "(exact, this packing)" in legend(state)
     assert player.reduction is None and np.all(player.exact["high"] >= given - 1e-6)
