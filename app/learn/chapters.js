@@ -131,7 +131,7 @@ export const CHAPTERS = [
       `All ${states} networks cover ${percent(part)} of what is possible for the green force; the dots, ${step > 1 ? "some of them" : "all of them"}, fill ${percent(share)} of the blue area. To get to its edge, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
       `A walk shows what is typical, not what is possible: drag the dot there by hand. And this is only a shadow: a part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S.`,
     ],
-    x: { low: 0.5, high: 4, label: "green force (mean force = 1)" }, y: { low: 0, high: 3, label: "violet force" },
+    x: { low: 0.5, high: 4, label: "green force (mean force = 1)" }, y: { low: 0, high: 3, label: "violet force", follows: true },
     experiment: Chance, options: {},
   },
   {

@@ -142,6 +142,7 @@ class Workbench {
     if (before && !(buildable && before.name === "own")) this.address.write(this.hand)
     this.showMu()
     this.say(before ? "" : this.model.note)
+    if (before && before.name !== scene.name) this.part("asked").textContent = ""
     this.rest()
     this.soon()
   }

@@ -146,6 +146,17 @@ def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
     page.get_by_role("radio", name="Gravity").wait_for()
 
 
+def test_the_last_questions_are_on_the_pages_that_answer_them(opening, lesson):
+    page = opening("?scene=stones&asked=stones", 1280, 900, first=True, at=lesson)
+    question = page.get_by_text("do three stones stand as an arch?")
+    question.wait_for()
+    page.get_by_role("combobox", name="Scene").select_option("ladder")
+    expect(question).to_have_count(0)
+    page = opening("?asked=hold", 1280, 900, at=lesson)
+    page.get_by_text("Click a line and press H").wait_for()
+    expect(page.get_by_text("left out of this link")).to_have_count(0)
+
+
 def test_a_chapter_is_dragged_with_the_mouse_and_only_what_was_touched_of_s_is_drawn(
     opening, lesson
 ):
