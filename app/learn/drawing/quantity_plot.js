@@ -5,7 +5,7 @@ const NS = "http://www.w3.org/2000/svg"
 const PILL = { high: 26, letter: 6.8, padding: 18 } // px
 const GAP = 5, INSET = 12 // px between a line and words next to it, and between two axes and the dot at their ends
 const GRAB = 26 // px from the dot within which dragging does not move it
-const NEAR = 0.03 // of the axis: a prediction that is right
+const NEAR = 0.05 // of the axis: a prediction that is right
 const STEPS = 60, FAST = 5 // keyboard steps along an axis; with the Shift key, so many at once
 let plots = 0 // so far: names what clips them
 
