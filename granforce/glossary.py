@@ -150,9 +150,7 @@ TERMS = {
         "How far this network is from the mean of all networks shown, measured in force space "
         "in ⟨fₙ⟩.",
     ),
-    "accepted": Term(
-        "accepted", "The fraction of the walk's attempts that ended in a balanced network."
-    ),
+    "accepted": Term("accepted", "How many of the walk's attempts ended in a balanced network."),
     "error": Term(
         "standard error",
         "The sampling error of a mean over the networks of this one packing: how much it would "

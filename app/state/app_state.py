@@ -95,7 +95,8 @@ class AppState(param.Parameterized):
         self._linked: tuple[Selection, View] | None = None  # of a link to states in no store
         self._stopped: list[tuple[Selection, int]] = []  # each with the networks asked for
         self._invalid: list[str] = []  # parameters of the last link that could not be read
-        self._wanted = 0  # number of the network to show once all are stored
+        # Number of the network to show once all are stored, and the frame on screen until then.
+        self._wanted = 0, 0
         self._place: Place | None = None
         self.work.computation.param.watch(self._bring_back, ["dismissed", "message"])
         observe(self._forget, self, "cell", "knowledge.known", "hand.pulls")
@@ -497,8 +498,8 @@ class AppState(param.Parameterized):
         number: of the network to show then, unless another one was chosen meanwhile. While this
         is under way, another number replaces it.
         """
-        cell, frame = self.cell, self.looks.frame
-        self._wanted = number
+        cell = self.cell
+        self._wanted = number, self.looks.frame
         if not self.keepable or self.missing or self.work.computation.running:
             return
         self.work.message = ""
@@ -506,7 +507,8 @@ class AppState(param.Parameterized):
         def done(shown: Shown) -> None:
             self._list(self.library.cells())
             if self.cell == cell:
-                wanted = {"frame": Numbered(self._wanted)} if self.looks.frame == frame else {}
+                number, frame = self._wanted
+                wanted = {"frame": Numbered(number)} if self.looks.frame == frame else {}
                 self._show(shown, self._by_numbers() | wanted)
 
         self.work.computation.start(compute.all_states(self.library, cell), done)

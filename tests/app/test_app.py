@@ -307,9 +307,11 @@ def test_all_networks_of_a_walk_can_be_kept_and_the_view_stays(state):
     The one that was asked for is then shown.
     """
     before, number, cells = state.replay.normal[5], state.replay.number, len(state.cells())
-    state.looks.param.update(frame=5, contact=9)
+    state.looks.param.update(frame=7, contact=9)
     assert state.keepable and len(number) == KEPT + 1
-    state.keep_all(int(number[5]) + 1)
+    state.keep_all(int(number[7]))
+    state.looks.frame = 5
+    state.keep_all(int(number[5]) + 1)  # meanwhile, another one
     wait_for(state)
     looks, replay = state.looks, state.replay
     assert list(replay.number) == list(range(STATES + 1)) and not state.keepable

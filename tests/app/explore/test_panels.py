@@ -627,6 +627,12 @@ def test_figures_of_the_paper_are_there_at_once_with_the_packing_on_screen(state
     assert list(view.indeterminacy.z.marks.data["y"]) == [row["coordination"]]
 
 
+def test_friction_is_drawn_although_the_catalogue_lacks_the_cell_on_screen(state):
+    state.catalogue = [cell for cell in state.catalogue if cell.mu != state.cell.mu]
+    view = friction_tab(state)
+    assert state.work.message == "" and state.cell.mu in view.indeterminacy.etas.marks.data["x"]
+
+
 def test_figure_1_is_drawn_from_the_networks_chosen(state):
     view = friction_tab(state)
     for sampler, words in (("sweeps_1e-3", "the paper’s walk"), ("walk", "nearest-network walk")):

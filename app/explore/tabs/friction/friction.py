@@ -78,7 +78,8 @@ class View(TabView):
         self.task.cancel()
         if state.replay is None or state.cell is None:
             return
-        cells = distributions.alike(state.catalogue, state.cell) or [state.cell]
+        others = [cell for cell in state.catalogue if cell.selection != state.cell.selection]
+        cells = distributions.alike(others, state.cell)
         replay = state.replay
         if replay is not self._of:
             self._clear()
@@ -150,13 +151,13 @@ class View(TabView):
 
 
 def read(cells: Sequence[Cell], cell: Cell) -> Callable[[Job], Rows]:
-    """Work that reads the numbers of the cells, where `cell` is on screen; and the study, once."""
+    """Work that reads the numbers of `cell`, on screen, and of others; and the study, once."""
 
     def work(job: Job) -> Rows:
-        job.begin(f"reading {len(cells)} results and the finished study")
+        job.begin(f"reading {len(cells) + 1} results and the finished study")
         study_data.study()
-        rows = distributions.rows(cells)
-        return Rows(rows, rows[list(cells).index(cell)])
+        rows = distributions.rows([*cells, cell])
+        return Rows(rows, rows[-1])
 
     return work
 
