@@ -16,6 +16,7 @@ _seconds = {
     "walk": 1.3, "uniform": 2.5, "intervals": 4.0, "perturbation": 90.0,
     "limit_loads": 4.0, "volume": 60.0, "outline": 2.0, "stress": 2.0,
 }  # fmt: skip
+LEAST_WORK = 0.2  # relative to the usual work; less lasts as long as compiling, and tells nothing
 # Kinds whose duration varies by factors between contacts (11 to 84 s): the longest so far counts.
 _VARYING = ("perturbation",)
 
@@ -31,8 +32,9 @@ def expected(job: Job, stage: str, kind: str, params: Parameters) -> Iterator[No
     begun, varies = time.perf_counter(), kind in _VARYING
     job.begin(stage, seconds(kind, params), longest=varies)
     yield
-    took = (time.perf_counter() - begun) / _work(kind, params)
-    if kind in _seconds:
+    work = _work(kind, params)
+    took = (time.perf_counter() - begun) / work
+    if kind in _seconds and work > LEAST_WORK:
         _seconds[kind] = max(took, _seconds[kind]) if varies else took
 
 

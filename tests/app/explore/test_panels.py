@@ -288,6 +288,14 @@ def test_a_push_says_how_far_it_got(state, monkeypatch):
     assert all(" — up to " in line for line in computing)
 
 
+def test_a_small_computation_does_not_change_what_a_large_one_is_said_to_take():
+    few, many = ({"packing": {"n": n}, "states": n} for n in (30, 400))
+    before = durations.seconds("walk", many)
+    with durations.expected(SimpleNamespace(begin=lambda *stage, **options: None), "", "walk", few):
+        pass
+    assert durations.seconds("walk", many) == before
+
+
 def test_the_sampler_is_chosen_beside_the_networks(state):
     known = Known(state)
     assert known.sampler == state.cell.kind == "walk"
