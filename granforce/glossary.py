@@ -296,14 +296,6 @@ TERMS = {
         "change from the forces as packed",
         "Orange contacts carry more than when the disks came to rest, blue ones less.",
     ),
-    "pinned": Term("pinned network", "A network marked for comparison with others."),
-    "sign": Term(
-        "sign of fₙ − pinned fₙ",
-        "Orange contacts carry more than in the pinned network, blue ones less.",
-    ),
-    "difference": Term(
-        "|fₙ − pinned fₙ|", "How much a contact's force differs from that in the pinned network."
-    ),
     "gone": Term(
         "what is known",
         "How much the known forces (fixed, or measured within an error bar) shorten a contact's "

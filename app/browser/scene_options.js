@@ -20,7 +20,7 @@ export function sceneQuery(scene, mu) {
 export const ONWARDS = {
   stones: ["scene=stones", "An arch of stones", "Change the friction: from which μ on do three stones stand as an arch?"],
   disks: ["scene=own", "Build your own", "Add a third disk: how many numbers can three disks leave free?"],
-  hold: ["colour=known", "400 disks", "Click a line and press H, to hold its force: which others does it bind?"],
+  hold: ["colour=known", "400 disks", "Click a line and press H to hold its force: which others does it bind?"],
 }
 
 /** The question with which a page was opened; empty without one. */

@@ -17,9 +17,7 @@ const prompted = ({ endless }, question) => (endless ? "Two contacts now lie in 
 const percent = (v) => `${Math.round(100 * v)}\u00a0%`
 const raised = (v) => [...String(v)].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("")
 // Without walls: a further row of the count.
-const PRESSED = [
-  ["two follow from the others, as forces between disks cancel in the sum over all disks; one more: the pressure is given", "− 2 + 1"],
-]
+const PRESSED = ["two follow from the others, as forces between disks cancel in the sum over all disks; one more: the pressure is given", "− 2 + 1"]
 
 const tabled = (rows) => `<table>${rows.map((row) => `<tr>${row.map((cell) => `<td>${cell}</td>`).join("")}</tr>`).join("")}</table>`
 
@@ -41,7 +39,7 @@ function counted({ contacts, disks, equations, free }, pressed) {
   return [
     [`${contacts} contacts × 2 forces, normal and tangential`, 2 * contacts],
     [`${disks} ${disks > 1 ? "disks" : "disk"} × 3 equations: no net force sideways, none up or down, no turning`, 3 * disks],
-    ...(pressed ? PRESSED : []),
+    ...(pressed ? [PRESSED] : []),
     [`free numbers: ${2 * contacts} − ${equations}`, free],
   ]
 }
@@ -102,7 +100,7 @@ export const CHAPTERS = [
     doing: () => "Drag the dot as far as it goes: right, up, left and down. What its path encloses turns blue: between two possible sets of forces, every mixture is possible too.",
     see: ({ high, weight, endless }) => [
       `Together, the disks weigh ${weight}. The other ${two(high - weight)} comes from the walls, where friction pulls the wedged disks down. With more, the lower disk would slip on the floor.`,
-      `Like any largest force, it is reached at a corner of S. Finding one is called a linear program; a computer does it for all forces of 400 disks in under a second.${PROGRAM}`,
+      `Like any maximum of a force, it lies at a corner of S. Finding it is called a linear program; a computer does it for all forces of 400 disks in under a second.${PROGRAM}`,
       prompted({ endless }, "Drag the dot along the edges: above the drawing you read what is about to slip. Then raise the friction, until S has no end here either."),
     ],
     count: (facts) => counted(facts, false),
@@ -136,7 +134,7 @@ export const CHAPTERS = [
   },
   {
     name: "friction", title: "Friction", card: "Friction at which forces are least determined", heading: "Where are forces least determined?",
-    text: ({ all, packings }) => `So far μ changed for the same disks. <b>Here each μ is a new packing</b>, one of ${packings}, of ${all} disks, pressed together with this friction. A walk through its S, all sets of forces that hold it, tells how much its forces vary: how far each typically is from its mean.`,
+    text: ({ all, packings }) => `Until now, μ changed and the disks stayed. <b>Here each of ${packings} values of μ has its own packing</b> of ${all} disks, pressed together with that friction. A walk through its S, all sets of forces that hold it, shows how much the forces vary: how far each typically is from its mean.`,
     ask: "At which friction μ do the forces vary most?",
     doing: () => "Drag the dot along the whole axis, to both ends. Blue: how much the forces vary. Grey: how many numbers are free.",
     see: ({ rows }) => {

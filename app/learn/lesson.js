@@ -181,8 +181,9 @@ class Lesson {
       this.asks = 0
       const { mechanism, experiment, model: { dark, palettes }, closing, progress } = this
       if (!mechanism) return
-      if (experiment.draw(dark, plain(palettes))) this.paint()
-      if (mechanism.stage === 2) closing?.draw(CHAPTERS.map(({ name, card, x }) => ({ name, card, x, ...progress.of(name) })), palette(dark), plain(palettes))
+      const colours = plain(palettes)
+      if (experiment.draw(dark, colours)) this.paint()
+      if (mechanism.stage === 2) closing?.draw(CHAPTERS.map(({ name, card, x }) => ({ name, card, x, ...progress.of(name) })), palette(dark), colours)
     })
   }
 }

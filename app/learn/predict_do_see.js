@@ -48,7 +48,7 @@ export class PredictDoSee {
 
   mark(value) {
     const [low, high] = this.possible
-    this.prediction = Math.min(high, Math.max(low, told(this.chapter.x, value)))
+    this.prediction = Math.min(high, Math.max(low, Number(told(this.chapter.x, value))))
     this.show()
   }
 

@@ -37,7 +37,7 @@ export class ClosingPicture {
   /** chapters: [{name, card, x: axis, prediction, answer: [low, high]}]; look: as from palette; palettes: of packings. */
   draw(chapters, look, palettes) {
     this.given = [chapters, look, palettes]
-    const { grab } = this, key = JSON.stringify(this.given)
+    const { grab } = this, key = JSON.stringify([chapters, look])
     if (!grab || key === this.key) return
     this.key = key
     const g = this.canvas.getContext("2d"), { left, right, top, step } = RAIL, write = writer(g), place = (x, value) => new Scale(x, left, right).px(Math.min(x.high, Math.max(x.low, value)))

@@ -68,7 +68,8 @@ export class Grab extends PackingExperiment {
   /** Give a contact the force value(its rail), as far as possible, once its rail is there. */
   async pull(contact, value) {
     this.wanted = [contact, value]
-    if (this.fetching) return this.rail ? undefined : this.say("finding how far it can be pulled …")
+    if (!this.rail) this.say("finding how far it can be pulled …")
+    if (this.fetching) return
     if (this.rail.contact !== contact) {
       this.fetching = true
       try {

@@ -178,7 +178,7 @@ class View(TabView):
         """Say what is drawn, and how many dimensions held forces leave."""
         replay, plane, whole = self.state.shown, self.state.plane, self.state.knowledge.whole
         if replay is not None and plane is not None:
-            left = whole.dimension[1] if whole is not None and self.state.narrows else None
+            left = None if whole is None or self.state.elsewhere else whole.dimension[1]
             self.lead.object = sentences.lead(replay, plane, self.outlined is not None, left)
 
     def _title(self, *events: Any) -> None:
